@@ -75,7 +75,7 @@ bool KeepsItsPose(const Motion& motion) {
   return motion.start.t == motion.end.t && IsTranslation(motion);
 }
 
-// Finds the contact of two hulls at rest, in their relation at all times.
+// Finds the contact of two hulls at rest, whose relation is the same at all times.
 absl::StatusOr<FirstContact> FindAtRest(const MovingHull& a, const MovingHull& b,
                                         const MotionOptions& options) {
   absl::StatusOr<Answer> answer =

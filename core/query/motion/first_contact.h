@@ -34,29 +34,30 @@ struct MovingHull {
 };
 
 struct MotionOptions {
-  // The largest width of the bracket of a contact, in (0, 1]. Translations without radii ignore it.
+  // Maximum width of the bracket of a contact, in (0, 1]. Translations without radii ignore it.
   double max_time_error = 0x1p-30;
-  // >= 0, length. If the pair rotates and its least separation is within this of 0, the relation
-  // may be kWithinTolerance. Absent: kDefaultRelativeResolution times the sizes of the hulls. Less
-  // than kLeastRelativeResolution times the size of the pair counts as that.
+  // >= 0, length. If the pair rotates and its minimum separation is within this distance of 0, the
+  // relation may be kWithinTolerance. Default: kDefaultRelativeResolution times the sizes of the
+  // hulls. Values below kLeastRelativeResolution times the size of the pair are raised to that
+  // product.
   std::optional<double> resolution;
-  // Contacts after this time need not be found: if the pair is separated up to a later time, the
-  // relation may be kSeparated, with such a time as separated_until.
+  // The search may ignore contacts after this time: if the pair is separated up to some later time,
+  // the relation may be kSeparated, with separated_until set to such a time.
   double latest = 1;
   bool want_certificate = false;
-  // The most pairs of pieces that a certificate of bodies may list.
+  // Maximum number of pairs of pieces that a certificate of bodies may list.
   uint64_t max_piece_certificates = std::numeric_limits<uint64_t>::max();
   // Polled in long loops; true ends the search with CANCELLED. May be empty.
   std::function<bool()> should_stop;
 };
 
-// Default of MotionOptions::resolution, relative to the largest absolute coordinates of the two
-// hulls and their radii, added.
+// Default of MotionOptions::resolution, relative to the sum of the largest absolute coordinates of
+// the two hulls and their radii.
 inline constexpr double kDefaultRelativeResolution = 1e-9;
 
-// The least MotionOptions::resolution, relative to the largest absolute coordinates of the hulls
-// and of their translations, added. Above the rounding of planes, which kMotionPlaneErrorFactor
-// bounds. A choice.
+// Minimum MotionOptions::resolution, relative to the sum of the largest absolute coordinates of the
+// hulls and of their translations. Above the rounding errors of planes, which
+// kMotionPlaneErrorFactor bounds. A choice.
 inline constexpr double kLeastRelativeResolution = 0x1p-38;
 
 // Returns OK, or INVALID_ARGUMENT for a max_time_error outside (0, 1], or a resolution that is
@@ -65,43 +66,45 @@ absl::Status ValidateMotionOptions(const MotionOptions& options);
 
 // The first contact of a pair in motion. `relation`:
 // - kSeparated: the pair is separated at all times.
-// - kOverlapping, kTouching: the pair meets. If both motions are translations, kOverlapping if it
-//   overlaps at some time, otherwise kTouching. For other motions, the relation at contact_time.
-// - kWithinTolerance: the least separation is within the resolution of 0, and neither contact nor
+// - kOverlapping, kTouching: the pair meets. If both motions are translations, kOverlapping if the
+//   pair overlaps at some time, otherwise kTouching. For other motions, the relation at
+//   contact_time.
+// - kWithinTolerance: the minimum separation is within the resolution of 0, and neither contact nor
 //   separation is proven.
 struct FirstContact {
   Relation relation = Relation::kSeparated;
-  // The pair is separated at all times before this; and at this time, unless it equals
+  // The pair is separated at all times before this, and at this time itself unless it equals
   // contact_time. 1 if kSeparated, unless MotionOptions::latest ended the search.
   double separated_until = 1;
-  // If the pair meets: it is in contact at some time of [separated_until, contact_time], and at
-  // contact_time itself unless the contact of two translations ends before the next double. The
-  // two times are equal or adjacent doubles for translations without radii. Otherwise they are
-  // adjacent or at most max_time_error apart, and farther only if the separation at separated_until
-  // is below kLeastRelativeResolution, so that no plane proves more.
+  // If the pair meets: it is in contact at some time in [separated_until, contact_time], and at
+  // contact_time itself unless the contact of two translations ends before the next double. The two
+  // times are equal or adjacent doubles for translations without radii. Otherwise they are adjacent
+  // or at most max_time_error apart. They are farther apart only if the separation at
+  // separated_until is below kLeastRelativeResolution, where planes prove nothing.
   std::optional<double> contact_time;
-  // If requested: consecutive intervals from 0 to separated_until, none if that is 0. Empty if a
-  // hull is empty.
+  // If requested: consecutive intervals from 0 to separated_until. Empty if separated_until is 0 or
+  // a hull is empty.
   std::vector<SeparatedInterval> intervals;
   // If requested and the pair meets: proof of contact at contact_time. The relation at that time is
   // kOverlapping if the certificate has no direction, otherwise kTouching.
   //
   // For translations with a contact that ends before contact_time: no direction, and at most four
-  // pairs. The hull of their differences meets 0 at some time between separated_until and
-  // contact_time; so the differences at both times, at most eight points, have 0 in their hull.
+  // pairs. The hull of their differences contains 0 at some time between separated_until and
+  // contact_time; so 0 is in the hull of the differences at both times, at most eight points.
   Boxed<Certificate> certificate;
 };
 
-// Finds the first contact of two hulls in motion. Exact if both motions are translations
-// (IsTranslation) and both radii 0, grazes included: the time is rational, and the bracket has no
-// double inside. Exact, too, if both are at rest. Otherwise never a miss and never a false contact;
-// the bracket is as narrow as requested, and the relation is kWithinTolerance only within the
-// resolution. Swapping A and B mirrors the answer. Empty hulls are separated from everything.
+// Finds the first contact of two hulls in motion. Exact, including grazes, if both motions are
+// translations (IsTranslation) and both radii are 0: the time is rational, and no double lies
+// strictly inside the bracket. Also exact if both hulls are at rest. Otherwise, no contact is
+// missed and none is false; the bracket is as narrow as requested, and the relation is
+// kWithinTolerance only within the resolution. Swapping A and B mirrors the answer. Empty hulls are
+// separated from everything.
 //
-// INVALID_ARGUMENT: ValidateMotion, ValidateMotionOptions; a radius is negative or not finite;
-// unless the pair meets before, no plane can be proven because a rotation nearly vanishes (all
-// components of q(t) below 2^-38 of the largest at the ends), or sizes are out of the range of
-// kMotionMinSize and kMotionMaxSize. CANCELLED: should_stop returned true.
+// INVALID_ARGUMENT: ValidateMotion, ValidateMotionOptions; a radius is negative or not finite; or,
+// unless the pair meets earlier, no plane can be proven because a rotation nearly vanishes (all
+// components of q(t) are below 2^-38 of the largest at the ends) or a size is outside
+// [kMotionMinSize, kMotionMaxSize]. CANCELLED: should_stop returned true.
 absl::StatusOr<FirstContact> FindFirstContact(const MovingHull& a, const MovingHull& b,
                                               const MotionOptions& options = {});
 

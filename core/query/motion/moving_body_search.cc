@@ -14,7 +14,8 @@
 namespace hulld {
 namespace {
 
-// Pairs that met are dropped once they have doubled in number, from this on. A choice.
+// Pairs that cannot be first are dropped when the number of pairs that met has doubled and is at
+// least this. A choice.
 constexpr size_t kLeastToDrop = 64;
 
 std::vector<uint32_t> PiecesOf(const MovingBody& body) {
@@ -25,8 +26,8 @@ std::vector<uint32_t> PiecesOf(const MovingBody& body) {
   return pieces;
 }
 
-// Ends the intervals at an earlier time. Their proofs hold for shorter intervals, too: the slack of
-// kMotionPlaneErrorFactor covers the rounding of a plane at its new end.
+// Ends the intervals at an earlier time. Their proofs remain valid for shorter intervals: the slack
+// of kMotionPlaneErrorFactor covers the rounding of a plane at its new end.
 void EndAt(double until, std::vector<SeparatedInterval>& intervals) {
   const auto ends_later = [=](const SeparatedInterval& interval) {
     return interval.until >= until;
@@ -82,7 +83,7 @@ absl::StatusOr<FirstContact> MovingBodySearch::Find(PiecePair pieces, double lat
   return FindFirstContact(a_->Piece(pieces.a), b_->Piece(pieces.b), options);
 }
 
-// Makes one step toward the first contact.
+// Takes one step toward the first contact.
 absl::Status MovingBodySearch::Search() {
   const std::optional<PiecePair> pieces = overlaps_at_start_ ? std::nullopt : meeting_.Next();
   if (!pieces) return Decide();

@@ -21,23 +21,25 @@ namespace hulld {
 
 // The first contact of two bodies in motion.
 struct BodyContact {
-  // Without intervals and certificate; those of pairs of pieces follow.
+  // Has no intervals and no certificate; `of_body` has those of the pairs of pieces.
   FirstContact contact;
-  // The pair of pieces that meets first; of several with one time, one with the strongest relation.
-  // If nothing meets, the first pair that may meet within the resolution, if any.
+  // The pair of pieces that meets first; of several that meet at the same time, one with the
+  // strongest relation. If no pair meets, the first pair that may meet within the resolution, if
+  // any.
   //
-  // If requested, certificates for every pair of pieces, neither of them empty, in ascending order
-  // of A's piece, then B's: intervals from 0 to separated_until, and relation kSeparated. The
-  // deciding pair has its own relation and the proof of its contact. If separated_until is 0, that
-  // is the only one.
+  // If requested, certificates for all pairs of nonempty pieces, in ascending order of A's piece,
+  // then B's: intervals from 0 to separated_until, and relation kSeparated. The deciding pair has
+  // its own relation and the proof of its contact. If separated_until is 0, only the deciding pair
+  // has a certificate.
   PiecesAnswer of_body;
 };
 
 // Finds the first contact of two bodies in motion: the earliest over all pairs of a piece of A and
-// a piece of B, each as by FindFirstContact. separated_until and contact_time are the least of all
-// pairs. They are farther apart than for two hulls only if another pair comes within the resolution
-// before the contact. The relation is the strongest over all pairs: for translations without any
-// radius, over all times; otherwise at contact_time. It is kWithinTolerance only if no pair meets.
+// a piece of B, each as in FindFirstContact. separated_until and contact_time are the minima over
+// all pairs. They are farther apart than for two hulls only if another pair comes within the
+// resolution before the contact. The relation is the strongest over all pairs: for translations
+// without radii, over all times; otherwise at contact_time. It is kWithinTolerance only if no pair
+// meets.
 //
 // A pair is settled without a search if the boxes around its motions are disjoint, and a search
 // ends at the earliest contact known. The search proceeds in steps, so that it can be time-sliced.
@@ -48,8 +50,8 @@ class MovingBodySearch {
   MovingBodySearch(const MovingBodySearch&) = delete;
   MovingBodySearch& operator=(const MovingBodySearch&) = delete;
 
-  // Makes at most `steps` steps of one pair of pieces each. Returns true if the search has ended.
-  // CANCELLED: should_stop returned true. INVALID_ARGUMENT: as FindFirstContact.
+  // Advances by at most `steps` steps, each for one pair of pieces. Returns true if the search has
+  // ended. CANCELLED: should_stop returned true. INVALID_ARGUMENT: as FindFirstContact.
   // RESOURCE_EXHAUSTED: more pairs of pieces than max_piece_certificates need a certificate.
   absl::StatusOr<bool> Advance(uint64_t steps);
   // Requires: the search has ended. Call at most once.
@@ -82,29 +84,29 @@ class MovingBodySearch {
   const MovingBody* a_;
   const MovingBody* b_;
   const MotionOptions* options_;
-  // The relation is the strongest over all times.
+  // True if the relation is the strongest over all times.
   bool is_plain_translation_;
-  // MotionOptions::latest, unless the relation depends on later times, too.
+  // MotionOptions::latest, unless the relation also depends on later times.
   double latest_;
   MeetingPieces meeting_;
   Stage stage_ = Stage::kPairs;
-  // In the order of the search, those that may be the first.
+  // Pairs that may meet first, in the order of the search.
   std::vector<Met> met_;
   size_t kept_ = 0;
   double earliest_ = std::numeric_limits<double>::infinity();
   // All pairs without a contact up to latest_ are separated up to this time.
   double others_until_ = 1;
   bool overlaps_ = false;
-  // No contact is earlier, and no relation stronger.
+  // True if the pair overlaps at time 0: no contact is earlier, and no relation is stronger.
   bool overlaps_at_start_ = false;
-  // Pieces that are not empty, and the next of their pairs to be proven.
+  // Nonempty pieces, and the index of the next of their pairs to prove.
   std::vector<uint32_t> pieces_a_;
   std::vector<uint32_t> pieces_b_;
   size_t next_ = 0;
   BodyContact result_;
 };
 
-// Runs a whole search. INVALID_ARGUMENT: ValidateMotionOptions. Otherwise as
+// Runs a complete search. INVALID_ARGUMENT: ValidateMotionOptions. Otherwise as
 // MovingBodySearch::Advance.
 absl::StatusOr<BodyContact> FindFirstContact(const MovingBody& a, const MovingBody& b,
                                              const MotionOptions& options = {});

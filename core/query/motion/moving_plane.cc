@@ -20,8 +20,8 @@ namespace {
 
 using Quaternion = std::array<double, 4>;
 
-// A hull turns too far in an interval if a Bernstein coefficient of |q(t)|^2 is below this times
-// the largest of |q|^2 at the ends: about 220 degrees, if both have one length. A choice.
+// A hull turns too far in an interval if a Bernstein coefficient of |q(t)|^2 is below this factor
+// times the larger |q|^2 at the ends: about 220 degrees if both have the same length. A choice.
 constexpr double kLeastRelativeWeight = 0x1p-4;
 
 double LargestOf(const Quaternion& q) {
@@ -53,7 +53,7 @@ constexpr size_t kMostScanned = 16;
 // Two doubles in a register.
 using Pair = double __attribute__((vector_size(16)));
 
-// Returns the largest n.v over points for each direction, with the bits of SupportValue.
+// Returns the largest n.v over the points for each direction, with the same bits as SupportValue.
 template <size_t kCount>
 std::array<double, kCount> ScanAlong(std::span<const Vector> points,
                                      const std::array<PlainVector, kCount>& n) {
@@ -108,7 +108,8 @@ std::array<double, kCount> ReachAlong(const QueryHull& hull,
 using Quadratic = std::array<double, 3>;
 using Quartic = std::array<double, 5>;
 
-// Polynomials by their Bernstein coefficients: a product, and a linear polynomial as a quadratic.
+// Operations on Bernstein coefficients: the product of two polynomials, and degree elevation from
+// linear to quadratic.
 Quartic Product(const Quadratic& f, const Quadratic& g) {
   return {f[0] * g[0], (f[0] * g[1] + f[1] * g[0]) / 2,
           (f[0] * g[2] + 4 * (f[1] * g[1]) + f[2] * g[0]) / 6, (f[1] * g[2] + f[2] * g[1]) / 2,
@@ -118,24 +119,25 @@ Quadratic Elevated(double f0, double f1) { return {f0, (f0 + f1) / 2, f1}; }
 
 }  // namespace
 
-// Bernstein coefficients of a hull in motion over an interval: first those at its ends, which
-// exclude most planes, then the others.
+// Bernstein coefficients of a hull in motion over an interval: first the end coefficients, which
+// rule out most planes, then the middle ones.
 class MovingPlane::Bounds {
  public:
   // Computes the coefficients at the ends.
   Bounds(Side& side, const PlainVector& n0, const PlainVector& n1, double start, double end);
-  // Computes the others. Requires: usable().
+  // Computes the middle coefficients. Requires: usable().
   void AddMiddle();
 
   // False if the hull turns too far.
   bool usable() const { return usable_; }
   // The larger of |q|^2 at both ends.
   double weight() const { return weight_; }
-  // Returns the farthest that the hull reaches along n at the start and at the end.
+  // Returns the maximum reach of the hull along n at the start and at the end.
   std::array<double, 2> Reach() const {
     return {most_[0] * inverse_weights_[0], most_[4] * inverse_weights_[4]};
   }
-  // Returns `most_` over the weights for offsets at both ends, less these.
+  // Returns the maximum coefficient of `most_` minus the offsets at both ends, divided by the
+  // weights.
   double HeightOver(double offset, double end_offset) const {
     const Quartic offsets = Product(norms_, Elevated(offset, end_offset));
     double height = -kInfinity;
@@ -143,7 +145,8 @@ class MovingPlane::Bounds {
       height = std::max(height, (most_[i] - offsets[i]) * inverse_weights_[i]);
     return height;
   }
-  // Returns the error bound of `most_` with offsets. `sizes`: lengths that the offsets are sums of.
+  // Returns the error bound of `most_` minus offsets. `sizes`: sum of the magnitudes of the terms
+  // of the offsets.
   double ErrorWith(double sizes) const {
     return error_ + kMotionPlaneErrorFactor * weight_ * sizes;
   }
@@ -157,8 +160,8 @@ class MovingPlane::Bounds {
   }
 
  private:
-  // Returns the coefficients `first` to `first + kCount - 1` of |q|^2 n.p, each at its largest
-  // over all vertices. `turned`: those of R(q)^T n.
+  // Sets the coefficients `first` to `first + kCount - 1` of |q|^2 n.p, each to its maximum over
+  // all vertices. `turned`: the coefficients of R(q)^T n.
   template <size_t kCount>
   void SetMost(size_t first, std::array<PlainVector, kCount> turned);
 
@@ -174,11 +177,11 @@ class MovingPlane::Bounds {
   // Their inverses, rounded.
   Quartic inverse_weights_;
   double weight_ = 0;
-  // Those of |q|^2 n.x.
+  // Coefficients of |q|^2 n.x.
   Quartic moved_;
-  // For each coefficient of |q|^2 n.p, its largest value over all vertices.
+  // Maximum of each coefficient of |q|^2 n.p over all vertices.
   Quartic most_;
-  // Error bound of `most_`; the offset adds to it.
+  // Error bound of `most_`, without that of the offsets.
   double error_ = 0;
   bool usable_ = false;
 };
@@ -295,7 +298,7 @@ template <size_t kCount>
 void MovingPlane::Bounds::SetMost(size_t first, std::array<PlainVector, kCount> turned) {
   std::array<double, kCount> moved;
   for (size_t i = 0; i < kCount; ++i) {
-    // Two coefficients are those at the ends.
+    // If kCount is 2, the coefficients are those at the ends.
     moved[i] = moved_[kCount == 2 ? 4 * i : first + i];
     if (!side_.piece) continue;
     moved[i] += hulld::Dot(turned[i], PlainVector(side_.piece->p_BH));
@@ -307,8 +310,8 @@ void MovingPlane::Bounds::SetMost(size_t first, std::array<PlainVector, kCount> 
 
 void MovingPlane::Bounds::AddMiddle() {
   if (start_.time == end_.time) {
-    // Each vertex has a linear polynomial. Means of two values err by less than the means of six
-    // directions in kMotionPlaneErrorFactor.
+    // Each vertex has a linear polynomial. The error of a mean of two values is below that of a
+    // mean of six directions, which kMotionPlaneErrorFactor includes.
     for (int i = 1; i < 4; ++i) most_[i] = 0.25 * ((4 - i) * most_[0] + i * most_[4]);
     return;
   }
@@ -354,7 +357,7 @@ MovingPlane::Result MovingPlane::Try(const Vector& n0, const Vector& n1, double 
   }
   a.AddMiddle();
   b.AddMiddle();
-  // The offset stays in the middle, or keeps pace with A or with B.
+  // The offset stays in the middle, or moves with A or with B.
   for (const double share : {0.5, 0.0, 1.0}) {
     const double offset = (1 - share) * of_a[0] + share * of_b[0];
     const double end_offset = (1 - share) * of_a[1] + share * of_b[1];

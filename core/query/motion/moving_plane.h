@@ -13,35 +13,37 @@
 
 namespace hulld {
 
-// Planes that turn between two hulls in motion over intervals of time, in floating point with a
-// proven bound.
+// Turning planes that separate two hulls in motion over intervals of time, in floating point with
+// proven error bounds.
 //
 // Let q(t) be the rotation of a hull and x(t) its translation. For a plane n(t).p = c(t), with n
 // and c linear in t, and a vertex v, |q(t)|^2 (n.p(t) - c) = (R(q(t))^T n).v + |q(t)|^2 (n.x(t) -
 // c) is a polynomial in t of degree 4. The Bernstein coefficients of R(q(t))^T n over an interval
-// are five directions in the hull's frame, and the largest value of a coefficient over all vertices
-// is the hull's support value along one of them. So five support values of each hull prove a plane
-// for all vertices and all times of the interval (Farouki and Rajan 1987). The offset may be chosen
-// last: each coefficient bounds it. The pose of a piece in its body does not depend on time: it
-// turns the five directions into the piece's frame, and adds a constant to each support value. For
-// a hull at rest, the polynomial is linear, and the support values at both ends suffice.
+// are five directions in the hull's frame, and the maximum of a coefficient over all vertices is
+// the hull's support value along one of these directions. So five support values of each hull prove
+// a plane for all vertices and all times in the interval (Farouki and Rajan 1987). The offset may
+// be chosen last: each coefficient bounds it. The pose of a piece in its body does not depend on
+// time: it turns the five directions into the piece's frame, and adds a constant to each support
+// value. For a hull at rest, the polynomial is linear, and the support values at both ends suffice.
 //
-// Poses at the times last used are kept.
+// Caches the poses at the most recently used times.
 class MovingPlane {
  public:
-  // Both hulls must outlive the result. Requires: valid motions (ValidateMotion), neither is empty.
+  // Both hulls must outlive the result. Requires: valid motions (ValidateMotion), and neither hull
+  // is empty.
   MovingPlane(const MovingHull& a, const MovingHull& b);
 
-  // The size of the pair: the largest absolute coordinates of the hulls and of their translations,
-  // and the radii, added.
+  // The size of the pair: the sum of the largest absolute coordinates of the hulls and of their
+  // translations, and of the radii.
   double size() const { return size_; }
 
-  // Returns false if planes may be impossible from a time on however far apart the hulls are: their
-  // sizes are out of range, or a rotation nearly vanishes (twice kInterpolationLeastRemainder).
+  // Returns false if planes may be unprovable from this time on, however far apart the hulls are:
+  // their sizes are out of range, or a rotation nearly vanishes (below twice
+  // kInterpolationLeastRemainder).
   bool IsUsableAt(double time);
 
-  // Poses of the frames that move at a time in [0, 1], rounded like those of planes, with
-  // quaternions of any length. Requires: IsUsableAt(time).
+  // Return the pose of each moving frame at a time in [0, 1], rounded as in planes, with a
+  // quaternion of any length. Requires: IsUsableAt(time).
   Pose PoseOfA(double time) { return PoseAt(a_, time); }
   Pose PoseOfB(double time) { return PoseAt(b_, time); }
   // Returns the gap along a direction n (as in Try) at a time in [0, 1], up to rounding. Requires:
@@ -49,21 +51,21 @@ class MovingPlane {
   double GapAt(const Vector& n, double time);
 
   struct Result {
-    // True if the plane with these offsets has A and B, with their radii, farther than `margin` on
-    // its two sides at all times of the interval.
+    // True if A and B, with their radii, lie on opposite sides of the plane with these offsets,
+    // each farther than `margin` from it, at all times in the interval.
     bool proven = false;
     double offset = 0;
     double end_offset = 0;
-    // Width of the range in which both offsets may move together, less error bounds; a lower bound
-    // of the least separation, up to rounding. -infinity if a hull turns too far for a statement.
-    // If not proven, it may be larger, but not than the gap at either end.
+    // Width of the range in which both offsets may move together, minus error bounds: a lower bound
+    // of the minimum separation, up to rounding. -infinity if a hull turns too far for any bound.
+    // If not proven, it may exceed the separation, but not the gap at either end.
     double gap = -std::numeric_limits<double>::infinity();
     // The gap along the direction at the end, up to rounding.
     double end_gap = -std::numeric_limits<double>::infinity();
   };
   // Tries the direction that turns from n0 to n1 (world frame, from A toward B, of unit length up
-  // to rounding) from time `start` to `end`. A margin may be negative. Requires: 0 <= start <= end
-  // <= 1, and the same direction if the times are equal.
+  // to rounding) from time `start` to `end`. The margin may be negative. Requires: 0 <= start <=
+  // end <= 1, and the same direction if the times are equal.
   Result Try(const Vector& n0, const Vector& n1, double start, double end, double margin = 0);
 
  private:
@@ -83,9 +85,9 @@ class MovingPlane {
   };
   struct Side {
     const QueryHull* hull;
-    // None if it is the identity.
+    // Empty if it is the identity.
     std::optional<PieceFrame> piece;
-    // Quaternions at both ends of the motion, at a common power of two.
+    // Quaternions at both ends of the motion, scaled by a common power of two.
     std::array<double, 4> q0;
     std::array<double, 4> q1;
     Vector x0;
@@ -96,7 +98,7 @@ class MovingPlane {
     double radius;
     // True if the motion ends where it starts.
     bool at_rest;
-    // Those last used.
+    // Most recently used poses.
     std::array<Frame, 4> frames;
     uint32_t oldest = 0;
   };

@@ -9,8 +9,8 @@
 namespace hulld {
 namespace {
 
-// The relative width of the bounds of the distance at which the walk ends: the share of the gap
-// that the direction may lose. A choice.
+// Relative width of the distance bounds at which the walk ends: the maximum share of the gap that
+// the direction may lose. A choice.
 constexpr double kRelativeWidth = 0x1p-10;
 
 }  // namespace
@@ -20,7 +20,7 @@ absl::StatusOr<Vector> NearestDirection(const FloatPair& pair, const Vector& fir
                                         const std::function<bool()>& should_stop) {
   if (pair.usable()) {
     SeparationGoal goal;
-    // With radii, the gap may be any share of the distance.
+    // With radii, the gap may be an arbitrarily small share of the distance.
     const bool rounded = pair.a().is_rounded() || pair.b().is_rounded();
     goal.relative_error = rounded ? 0 : kRelativeWidth;
     const SeparationBounds bounds =

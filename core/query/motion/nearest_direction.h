@@ -22,7 +22,7 @@ absl::StatusOr<Vector> NearestDirection(const FloatPair& pair, const Vector& fir
                                         FloatCombination& nearest,
                                         const std::function<bool()>& should_stop);
 
-// Returns the same direction, exact but for the rounding to unit length. Errors: as above.
+// Returns the same direction, exact except for the rounding to unit length. Errors: as above.
 absl::StatusOr<Vector> ExactNearestUnit(const FloatPair& pair,
                                         const std::function<bool()>& should_stop);
 

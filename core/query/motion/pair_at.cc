@@ -21,7 +21,7 @@ void PlaceAt(const Pose& X_WB, const MovingHull& moving, std::optional<PoseProdu
   placed.emplace(moving.hull, *product, moving.radius, moving.piece_radius);
 }
 
-// A pose of the caller has fewer bits than the same pose as a time of a motion.
+// The caller's pose has fewer bits than the same pose computed as a time of a motion.
 void PlaceAt(double time, const MovingHull& moving, std::optional<PoseProduct>& product,
              std::optional<PlacedHull>& placed) {
   const auto& [start, end] = moving.X_WB;

@@ -17,14 +17,14 @@
 
 namespace hulld {
 
-// Two hulls in motion at a time, for queries of hulls at rest; exact, without rounding of the pose.
-// Not movable, because its parts refer to each other.
+// Two hulls in motion at a given time, for queries of hulls at rest; exact, without rounding of the
+// poses. Not movable, because its parts refer to each other.
 class PairAt {
  public:
-  // Both hulls must outlive the result. Requires: neither is empty, valid motions
+  // Both hulls must outlive the result. Requires: neither hull is empty, valid motions
   // (ValidateMotion), and a time in [0, 1].
   PairAt(const MovingHull& a, const MovingHull& b, double time);
-  // The hulls with their frames at given poses.
+  // Places the hulls with their frames at the given poses.
   PairAt(const MovingHull& a, const Pose& X_WA, const MovingHull& b, const Pose& X_WB);
   PairAt(const PairAt&) = delete;
   PairAt& operator=(const PairAt&) = delete;

@@ -11,7 +11,7 @@
 namespace hulld {
 namespace {
 
-// Adds a direction to a span.
+// Returns the span extended by a direction.
 MinkowskiSpan Extended(MinkowskiSpan span, const IntegerVector& u) {
   switch (span.dimension) {
     case 0:
@@ -46,7 +46,8 @@ void ThickenAcross(const MinkowskiSpan& span, const Integer& size,
   int axis = 0;
   while (span.direction[axis].is_zero()) ++axis;
   for (int i = 0; i < 3; ++i) {
-    // A normal has its axis outside the plane; a line has the other two outside of it.
+    // For a plane, `axis` is outside the span, because the normal has a component along it. For a
+    // line, the other two axes are.
     if ((i == axis) != (span.dimension == 2)) continue;
     IntegerVector half = {0, 0, 0};
     half[i] = size;

@@ -13,18 +13,18 @@
 namespace hulld {
 namespace {
 
-// Returns an upper bound of the distance of the points of a box from a point.
+// Returns an upper bound of the distance from a point to any point of a box.
 double Reach(const Box& box, const Vector& from) {
   const Vector farthest = (box.low - from).cwiseAbs().cwiseMax((box.high - from).cwiseAbs());
-  // Differences, squares, sum, and root have a relative error below 2^-50, or lose less than the
-  // least double.
+  // The differences, squares, sum, and root together have a relative error below 2^-50, or lose
+  // less than the smallest positive double.
   constexpr double kRoundedUp = 1 + 0x1p-50;
   return farthest.stableNorm() * kRoundedUp + std::numeric_limits<double>::min();
 }
 
-// A rotation about the frame's origin keeps the distance of each point from it. A point that
-// translates moves linearly between its positions at both ends, which are in the boxes there.
-// box_at: returns the bounding box at a pose.
+// A rotation about the origin of the frame preserves the distance of each point from it. A point
+// that translates moves linearly between its positions at both ends, which are in the boxes at the
+// ends. box_at: returns the bounding box at a pose.
 template <typename BoxAt>
 MovingBox Moving(const Motion& X_WB, const BoxAt& box_at) {
   const auto& [start, end] = X_WB;
@@ -45,11 +45,11 @@ struct TimeSpan {
 
   bool IsEmpty() const { return begin > end; }
   // Drops times at which a gap that changes linearly, from `first` at time 0 to `last` at time 1,
-  // is negative; returns false if it is so at all of them. Both are differences of two doubles,
+  // is negative; returns false if it is negative at all times. Both are differences of two doubles,
   // rounded: their signs are exact. If the signs differ, they err by u of themselves, their
   // difference by 2 u, and the time at which the gap is 0 by 4 u + 8 u^2 of itself, and by
-  // underflow of the quotient. It is moved outwards by 8 u and the least normal double. **Proven.**
-  // An overflow or NaN drops nothing.
+  // underflow of the quotient. That time is moved outwards by 8 u and the smallest normal double.
+  // **Proven.** An overflow or NaN drops nothing.
   bool KeepNonNegative(double first, double last) {
     if (first < 0 && last < 0) return false;
     if (!(first < 0) && !(last < 0)) return true;
@@ -84,9 +84,9 @@ MovingBox MovingBoxOf(const MovingBody& moving) {
   });
 }
 
-// Relative to B, the boxes meet along an axis while both gaps between opposite bounds are not
-// negative. These are linear in time, so they meet at some time if and only if the intervals of all
-// six gaps have a common point.
+// The boxes meet along an axis while neither gap between opposite bounds is negative. These are
+// linear in time, so they meet at some time if and only if the intervals of all six gaps have a
+// common point.
 bool MayMeet(const MovingBox& a, const MovingBox& b, double until) {
   TimeSpan times{.end = until};
   for (int axis = 0; axis < 3; ++axis) {

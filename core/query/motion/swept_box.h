@@ -7,19 +7,20 @@
 
 namespace hulld {
 
-// The box of a placement in motion (world frame). Its bounds move linearly: at time t, they are (1
+// The bounding box of a placement in motion (world frame). Its bounds move linearly: at time t,
+// they are (1
 // - t) start.low + t end.low and (1 - t) start.high + t end.high.
 struct MovingBox {
   Box start;
   Box end;
 
-  // The least box that contains it at all times.
+  // The smallest box that contains this one at all times.
   Box Around() const { return {start.low.cwiseMin(end.low), start.high.cwiseMax(end.high)}; }
 };
 
 // Returns a box that certainly contains the rounded hull at each time. For a translation, the boxes
 // of both ends (BoundingBox). A rotation may turn the hull in any direction, so its box is at rest.
-// Empty for an empty hull. Requires a valid motion.
+// Empty for an empty hull. Requires: a valid motion.
 MovingBox MovingBoxOf(const MovingHull& moving);
 // Returns a box that certainly contains all pieces of the body at each time; see above.
 MovingBox MovingBoxOf(const MovingBody& moving);
@@ -28,8 +29,8 @@ MovingBox MovingBoxOf(const MovingBody& moving);
 inline Box SweptBox(const MovingHull& moving) { return MovingBoxOf(moving).Around(); }
 inline Box SweptBox(const MovingBody& moving) { return MovingBoxOf(moving).Around(); }
 
-// Returns false only if the boxes are disjoint at each time up to `until`. True for some pairs that
-// come within rounding of each other.
+// Returns false only if the boxes are disjoint at each time up to `until`. May return true for
+// disjoint boxes whose gap is within rounding.
 bool MayMeet(const MovingBox& a, const MovingBox& b, double until = 1);
 
 }  // namespace hulld

@@ -25,7 +25,7 @@ namespace {
 // Factor between the strides of successive exact queries. A choice.
 constexpr int64_t kStrideFactor = 16;
 
-// Positions among the non-negative doubles, in ascending order.
+// Returns the position of a double among the non-negative doubles, in ascending order.
 int64_t OrdinalOf(double x) { return std::bit_cast<int64_t>(x); }
 double DoubleAt(int64_t ordinal) { return std::bit_cast<double>(ordinal); }
 
@@ -35,7 +35,7 @@ struct FloorTime {
   bool exact;
 };
 
-// Requires: numerator >= 0, denominator > 0. Numbers above 1 become 1.
+// Requires: numerator >= 0, denominator > 0. Rounds numbers above 1 to 1.
 FloorTime RoundDown(const Integer& numerator, const Integer& denominator) {
   HULLD_CHECK(Sign(numerator) >= 0 && Sign(denominator) > 0);
   if (numerator >= denominator) return {1, numerator == denominator};
@@ -91,7 +91,7 @@ bool IsInside(const IntegerVector& p, const IntegerVector& q, const IntegerVecto
 
 }  // namespace
 
-// The unit of the pair at time 1/2 divides half of each translation.
+// Half of each translation is a multiple of the unit of the pair at time 1/2.
 TranslationSearch::Middle::Middle(const MovingHull& a, const MovingHull& b,
                                   const std::function<bool()>& should_stop)
     : at(a, b, 0.5), pair(at.pair(), should_stop) {
@@ -143,19 +143,19 @@ void TranslationSearch::TakeEntry(double before, double after, Relation relation
   upper_ = after;
   upper_state_ = Upper::kContact;
   relation_ = relation;
-  // There is no better direction at lower_.
+  // No direction at lower_ is better.
   raised_ = true;
 }
 
 // Finds the time exactly if the origin enters C through the triangle at which the cast ended. If
-// its line crosses the border of the triangle, or C is flat, it may only graze C.
+// the line of the path crosses the border of the triangle, or C is flat, the path may only graze C.
 absl::Status TranslationSearch::TryFacet() {
   if (upper_state_ != Upper::kUnknown || !facet_) return absl::OkStatus();
   ExactPair pair(start_.pair(), options_.should_stop);
   const IntegerVector p = pair.Difference((*facet_)[0]);
   const IntegerVector q = pair.Difference((*facet_)[1]);
   const IntegerVector r = pair.Difference((*facet_)[2]);
-  // The displacement in units of the pair over 2^shift.
+  // The displacement, in the unit of the pair divided by 2^shift.
   const Vector& end_a = a_.X_WB.end.t;
   const Vector& end_b = b_.X_WB.end.t;
   const int exponent = LowestBitExponent(end_a, LowestBitExponent(end_b, pair.exponent()));
@@ -176,7 +176,7 @@ absl::Status TranslationSearch::TryFacet() {
   const Integer reach = Dot(n, p);
   const bool is_facet = !speed.is_zero() && Dot(n, pair.Farthest(n).w) == reach;
   if (pair.stopped()) return MotionStopped();
-  // Before time 0 or at the end, the other steps decide.
+  // If the time is before 0 or at the end, the other steps decide.
   if (!is_facet || Sign(reach) > 0) return absl::OkStatus();
   const FloorTime entry = RoundDown(-reach << shift, -speed);
   if (entry.value == 1) return absl::OkStatus();
@@ -217,8 +217,8 @@ absl::Status TranslationSearch::Narrow() {
   }
 }
 
-// Takes the direction in which the pair is nearest at lower_. So close to the contact, its plane
-// holds a face, edge, or vertex of C that the origin meets first.
+// Takes the direction in which the pair is nearest at lower_. This close to the contact, its plane
+// contains the face, edge, or vertex of C that the origin meets first.
 absl::Status TranslationSearch::RaiseToNearest() {
   raised_ = true;
   const PairAt at(a_, b_, lower_);
@@ -262,12 +262,12 @@ absl::Status TranslationSearch::TakeSeparating(double time, Direction direction)
   const IntegerVector n = ToExact(direction);
   const Integer speed = Dot(n, middle().half);
   if (Sign(speed) >= 0) {
-    // Without motion along the direction, it separates at all times.
+    // Without motion along it, the direction separates the pair at all times.
     TakeSeparatedFrom(speed.is_zero() ? 0 : time, std::move(direction));
     return absl::OkStatus();
   }
-  // n.(w - (2 t - 1) half) < 0 for all w of C at the middle, and at the end of this interval 0 for
-  // one of them.
+  // For t in this interval, n.(w - (2 t - 1) half) < 0 for all w of C at time 1/2; at its end, this
+  // is 0 for one w.
   const Integer reach = Dot(n, middle().pair.Farthest(n).w);
   if (middle().pair.stopped()) return MotionStopped();
   const FloorTime until = RoundDown(-reach - speed, -2 * speed);
@@ -293,11 +293,12 @@ void TranslationSearch::TakeSeparatedFrom(double time, Direction direction) {
 }
 
 absl::StatusOr<FirstContact> TranslationSearch::Conclude() {
-  // A plane that only touches at lower_ proves nothing there, but the swept pair has a better one.
+  // A plane that only touches at lower_ does not prove separation there; the swept pair has a
+  // better one.
   const bool covered = upper_ < lower_ || (upper_ == lower_ && (lower_excluded_ || upper_ == 0));
   if (upper_state_ == Upper::kSeparatedAfter && covered) return Separated();
   if (upper_state_ == Upper::kSeparatedAfter || relation_ == Relation::kTouching) {
-    // A pair without motion touches at all times.
+    // A pair without relative motion touches at all times.
     if (!IsZero(middle().half)) {
       absl::StatusOr<SweptRelation> swept =
           FindSweptRelation(middle().pair, middle().half, options_.should_stop);

@@ -22,16 +22,17 @@ namespace hulld {
 
 // Finds the first contact of two translations, exactly. With d the displacement of B relative to A,
 // the pair is in contact at t if t d is in C, which is A - B at t = 0. A direction n with n.w < 0
-// for all w of C - t d separates the pair at t; if n.d < 0, also at all times before the one at
-// which the plane reaches the origin, a rational number; otherwise at all times after t.
+// for all w of C - t d separates the pair at t; if n.d < 0, also at all times before the plane
+// reaches the origin, at a rational time; otherwise at all times after t.
 //
 // A cast in floating point usually proves a plane that separates the pair throughout, or ends at
 // the triangle of C that the origin enters. Double-double arithmetic proves the entry between two
 // doubles; if that fails, or a certificate is requested, one exact test of the triangle gives the
 // time. Otherwise, directions come from exact queries at doubles. These close in on the first
 // contact from both sides: each moves either the time before which the pair is separated, or the
-// earliest time known to be in contact or after it, until the two are adjacent doubles. A contact
-// between adjacent doubles that none of them shows is found by one exact query of the swept pair.
+// earliest time known to be in contact or after it, until the two are adjacent doubles. If a
+// contact lies between adjacent doubles and no query at a double shows it, one exact query of the
+// swept pair finds it.
 class TranslationSearch {
  public:
   // All arguments must outlive the search. Requires: neither hull is empty, and both motions are
@@ -95,10 +96,10 @@ class TranslationSearch {
   std::optional<Direction> after_;
   // The relation at upper_, if kContact.
   Relation relation_ = Relation::kSeparated;
-  // Number of doubles from lower_ to the next query, and how often it may still return to 1.
+  // Number of doubles from lower_ to the next query, and how often it may still be reset to 1.
   int64_t stride_ = 1;
   int restarts_left_ = 16;
-  // True if the direction in which the pair is nearest at lower_ was tried, or is known.
+  // True if the direction in which the pair is nearest at lower_ is known or has been tried.
   bool raised_ = false;
 };
 

@@ -18,31 +18,31 @@
 namespace hulld {
 namespace {
 
-// A step ends when this share of its gap is left, or, once it makes progress, after this many
+// A step ends when this share of its gap is left, or, once it has made progress, after this many
 // trials. Choices.
 constexpr double kLeftShare = 0x1p-5;
 constexpr int kMostTrials = 10;
-// A constant plane loses to one that turns if this share of its gap is left in the nearest
-// direction at its end. A choice.
+// A plane that turns replaces a constant one if, at the end of the latter, this share of its gap is
+// left along the nearest direction. A choice.
 constexpr double kTurnedShare = 0.25;
 // A plane turns by less than 60 degrees, so that its normal, linear in time, keeps more than 0.86
 // of its length. A choice.
 constexpr double kLeastCosine = 0.5;
 // Trials keep this share of an interval away from its ends. A choice.
 constexpr double kLeastShare = 0x1p-4;
-// Share of the last step over which the rate of the gap is taken. A choice.
+// Share of the last step over which the rate of the gap is measured. A choice.
 constexpr double kRateShare = 0x1p-10;
 // A leap leaves at least this share of the distance to the likely contact, and this multiple of the
-// error that is expected from the last one. Choices.
+// error expected from that of the last one. Choices.
 constexpr double kLeastLeftShare = 0x1p-20;
 constexpr double kLeapSlack = 8;
-// A bracket below this is narrow. A choice.
+// A bracket below this width is narrow. A choice.
 constexpr double kNarrowBracket = 0x1p-20;
-// The most times at which a passage is cut, and the least share of an interval on either side.
-// Choices.
+// Maximum number of times at which a passage is cut, and minimum share of an interval on either
+// side of a cut. Choices.
 constexpr int kMostCuts = 10;
 constexpr double kLeastCutShare = 0x1p-5;
-// Two directions are one if the gaps along them differ by less than this share. A choice.
+// Two directions count as equal if the gaps along them differ by less than this share. A choice.
 constexpr double kSameShare = 0x1p-6;
 // Factor between the lengths of successive steps, at first trial. A choice.
 constexpr double kGrowth = 4;
@@ -52,22 +52,22 @@ constexpr double kShortestStep = 0x1p-50;
 // of the last one may be due to the error of a floating-point direction. Choices.
 constexpr double kExactShare = 0x1p-36;
 constexpr double kPoorShare = 0x1p-8;
-// An exact direction is expensive: only this many trials of a step take one at their end, and steps
-// are given up below this length or share of the last one, whichever is less. Choices.
+// An exact direction is expensive: only this many trials of a step compute one at their end, and
+// steps below this length or this share of the last one, whichever is less, are abandoned. Choices.
 constexpr int kMostExactTrials = 10;
 constexpr double kShortestExactStep = 0x1p-40;
 constexpr double kShortestExactShare = 0x1p-12;
-// A contact is looked for at this many times after the search is stuck, each this much farther
-// away, before tolerable planes. Choices.
+// After the search is stuck, and before it tries tolerable planes, it looks for a contact at this
+// many times, each farther away by this factor. Choices.
 constexpr int kMostSoonTimes = 8;
 constexpr double kSoonGrowth = 4;
-// Share of the last length below which a tolerable step is not tried before the search is stuck. A
-// choice.
+// Before the search is stuck, it does not try tolerable steps below this share of the last length.
+// A choice.
 constexpr double kLeastTolerableShare = 0x1p-8;
 
-// Returns a time between two at which a plane is proven, with gap `gap`, and not proven, with
-// `failed_gap`: shortly before the gap would close. A plane of constant direction loses a multiple
-// of the time, one that turns a multiple of its square.
+// Returns a time between `proven`, where a plane is proven with `gap`, and `failed`, where it is
+// not, with `failed_gap`: shortly before the gap would close. The loss of a plane is linear in time
+// if its direction is constant, and quadratic if it turns.
 double TrialBetween(double proven, double gap, double failed, double failed_gap, bool turned) {
   const double length = failed - proven;
   const double lost = gap / (gap - failed_gap);
@@ -76,7 +76,8 @@ double TrialBetween(double proven, double gap, double failed, double failed_gap,
   return proven + length * std::clamp(share, kLeastShare, 1 - kLeastShare);
 }
 
-// Returns a unit direction within 54 degrees of m: n or, between both, the nearest to n.
+// Returns a unit direction within 54 degrees of m: n, or else the direction between m and n that is
+// nearest to n.
 Vector TurnedToward(const PlainVector& m, const PlainVector& n) {
   constexpr double kCosine = 0.6;
   constexpr double kSine = 0.8;
@@ -90,7 +91,7 @@ Vector TurnedToward(const PlainVector& m, const PlainVector& n) {
   return 1 / Norm(turned) * turned;
 }
 
-// Returns the least positive root of a + b x + c x^2, or infinity. Requires: a > 0.
+// Returns the smallest positive root of a + b x + c x^2, or infinity. Requires: a > 0.
 double SmallestRoot(double a, double b, double c) {
   const double squared = b * b - 4 * a * c;
   if (!(squared >= 0)) return kInfinity;
@@ -134,7 +135,7 @@ absl::StatusOr<FirstContact> TurningSearch::Run() {
     const Step& step = **found;
     Take(step);
     if (separated_ == 1 || separated_ > options_.latest) break;
-    // Contact is likely where the plane fails, and after it.
+    // Contact is likely at and after the time at which the plane fails.
     const double latest = LatestContactTime();
     // In a narrow bracket, the later time needs exact arithmetic less often.
     const bool is_narrow = latest - step.failed < kNarrowBracket;
@@ -156,7 +157,7 @@ absl::StatusOr<FirstContact> TurningSearch::Run() {
 
 void TurningSearch::Take(const Step& step) {
   if (options_.want_certificate) {
-    // In place: g++ 12 warns of a variant that is moved there.
+    // Constructed in place, because g++ 12 warns if the variant is moved here.
     SeparatedInterval& interval = intervals_.emplace_back();
     interval.until = step.until;
     interval.direction = step.direction;
@@ -178,9 +179,9 @@ absl::StatusOr<TurningSearch::Ahead> TurningSearch::LookAt(double time) {
   return Ahead{time, *n, n->isZero(0) ? 0 : plane_.GapAt(*n, time)};
 }
 
-// Proves the separation up to the end or to shortly before a contact, by few planes. While no plane
-// between two times is proven, another time between them is added, at which the hulls may be
-// nearest. Gives up early; intervals_ hold what it proved.
+// Proves the separation up to the end or to shortly before a contact, with few planes. While no
+// plane between two times is proven, adds a time between them at which the hulls may be nearest.
+// Gives up early; intervals_ contains the proven intervals.
 absl::Status TurningSearch::ProvePassage() {
   absl::StatusOr<Ahead> from = LookAt(0);
   if (!from.ok()) return from.status();
@@ -189,7 +190,8 @@ absl::Status TurningSearch::ProvePassage() {
   if (!(from->gap > 0)) return absl::OkStatus();
   std::array<Ahead, kMostCuts + 1> ahead;
   size_t count = 0;
-  // Whatever options_.latest is, so that searches for another latest time take the same steps.
+  // Independent of options_.latest, so that searches with different latest times take the same
+  // steps.
   double next = 1;
   for (int cuts = 0; cuts <= kMostCuts; ++cuts) {
     if (poll_.Step()) return MotionStopped();
@@ -209,8 +211,8 @@ absl::Status TurningSearch::ProvePassage() {
   return absl::OkStatus();
 }
 
-// Takes a step between two times, if a plane is proven whose direction is that at one of them, or
-// turns from one to the other. Otherwise returns a time between them.
+// Takes a step between two times if it can prove a plane that has the direction at one of them, or
+// turns from one direction to the other. Otherwise returns a time between them.
 std::optional<double> TurningSearch::CutOf(const Ahead& from, const Ahead& to) {
   const auto try_plane = [&](const Vector& start, const Vector& end) {
     const MovingPlane::Result found = plane_.Try(start, end, from.time, to.time);
@@ -224,11 +226,11 @@ std::optional<double> TurningSearch::CutOf(const Ahead& from, const Ahead& to) {
   const double gap_at_start = plane_.GapAt(to.direction, from.time);
   if (gap_at_start > 0 && try_plane(to.direction, to.direction)) return std::nullopt;
   if (gap_at_end > 0 && try_plane(from.direction, from.direction)) return std::nullopt;
-  // If both gaps were linear in time, that along the plane would have these Bernstein coefficients
-  // of degree 4, up to factors.
+  // If both gaps were linear in time, the gap along the plane would have these Bernstein
+  // coefficients of degree 4, up to factors.
   const double middle = (gap_at_end + gap_at_start) / 2;
   if (from.gap + middle > 0 && (from.gap + to.gap) + 4 * middle > 0 && middle + to.gap > 0) {
-    // The end with the larger gap can spare some.
+    // The end with the larger gap has some to spare.
     const bool starts_wide = from.gap > to.gap;
     const Vector start = starts_wide ? TurnedToward(to.direction, from.direction) : from.direction;
     const Vector end = starts_wide ? to.direction : TurnedToward(from.direction, to.direction);
@@ -238,10 +240,10 @@ std::optional<double> TurningSearch::CutOf(const Ahead& from, const Ahead& to) {
   const double excess = (from.gap - gap_at_start) + (to.gap - gap_at_end);
   double share = 0.5;
   if (excess > kSameShare * (from.gap + to.gap)) {
-    // Where both gaps are equal, if they are linear.
+    // The time at which both gaps are equal, if they are linear.
     share = (from.gap - gap_at_start) / excess;
   } else {
-    // Where a parabola is least.
+    // The minimum of a parabola.
     const double soon = from.time + kRateShare * length;
     const double rate = (plane_.GapAt(from.direction, soon) - from.gap) / kRateShare;
     const double curvature = gap_at_end - from.gap - rate;
@@ -260,7 +262,7 @@ absl::StatusOr<Relation> TurningSearch::RelationAt(double time) const {
 absl::StatusOr<Vector> TurningSearch::DirectionAt(double time) {
   if (!plane_.IsUsableAt(time)) return Vector(Vector::Zero());
   if (exact_) return ExactNearestUnit(PairAt(a_, b_, time).pair(), options_.should_stop);
-  // Rounded like the plane that the direction is for.
+  // Rounded like the plane that will use this direction.
   const PairAt at(a_, plane_.PoseOfA(time), b_, plane_.PoseOfB(time));
   const Vector first =
       direction_.isZero(0) ? Vector(-Vector(at.pair().CenterDifference())) : direction_;
@@ -299,8 +301,8 @@ bool TurningSearch::IsPoor(const Step& step) const {
          step.until - separated_ < kPoorShare * last_length_;
 }
 
-// Returns a time at which contact is likely, with `gap` along the nearest direction n: where the
-// parabola through this gap, the last one, and the present rate vanishes. Infinite if nowhere.
+// Returns a time at which contact is likely, with `gap` along the nearest direction n: the zero of
+// the parabola through this gap and the last one with the current rate. Infinite if there is none.
 double TurningSearch::LikelyContact(const Vector& n, double gap) {
   if (!(last_gap_ < kInfinity)) return kInfinity;
   const double soon = std::min(1.0, separated_ + kRateShare * last_length_);
@@ -310,14 +312,14 @@ double TurningSearch::LikelyContact(const Vector& n, double gap) {
   return separated_ + SmallestRoot(gap, rate, curvature);
 }
 
-// Tries a step along a plane that turns, to shortly before a likely time of contact.
+// Tries a step with a turning plane to shortly before a likely time of contact.
 absl::StatusOr<std::optional<TurningSearch::Step>> TurningSearch::LeapTo(double contact,
                                                                          const Vector& n,
                                                                          double gap) {
   const double length = contact - separated_;
   double share = std::min(kLeftShare, length / last_length_);
   if (leap_length_ > 0) {
-    // The error of a parabola, as a share of the length, falls at least as the length does.
+    // The error of a parabola, as a share of the length, falls at least linearly with the length.
     const double error = std::abs(contact - likely_contact_) / leap_length_;
     share =
         std::min(share, std::max(kLeapSlack * error * (length / leap_length_), kLeastLeftShare));
@@ -328,7 +330,7 @@ absl::StatusOr<std::optional<TurningSearch::Step>> TurningSearch::LeapTo(double 
   if (!at_end.ok()) return at_end.status();
   if (!(n.dot(*at_end) > kLeastCosine)) return std::nullopt;
   const MovingPlane::Result turned = plane_.Try(n, *at_end, separated_, until);
-  // Past a graze, the gap is not nearly closed.
+  // Past a graze, the gap does not nearly close.
   if (!turned.proven || turned.end_gap > 4 * kLeftShare * gap) return std::nullopt;
   likely_contact_ = contact;
   leap_length_ = length;
@@ -336,13 +338,13 @@ absl::StatusOr<std::optional<TurningSearch::Step>> TurningSearch::LeapTo(double 
   return Step{until, n, {turned, *at_end}, gap, contact};
 }
 
-// Returns a long interval for which a plane of direction n at its start is proven, or none if there
+// Returns a long interval with a proven plane that has direction n at its start, or none if there
 // is no progress.
 absl::StatusOr<std::optional<TurningSearch::Step>> TurningSearch::FindStep(const Vector& n) {
   if (n.isZero(0)) return std::nullopt;
   const MovingPlane::Result start = plane_.Try(n, n, separated_, separated_);
   if (!start.proven) return std::nullopt;
-  // Up to rounding, without the error bound.
+  // Accurate up to rounding; excludes the error bound.
   const double gap = start.end_gap;
   if (steps_to_leap_ > 0) {
     --steps_to_leap_;
@@ -385,7 +387,8 @@ absl::StatusOr<std::optional<TurningSearch::Step>> TurningSearch::FindStep(const
   return step;
 }
 
-// Returns the latest time that is within max_time_error of separated_, or at least the next double.
+// Returns the latest time that is within max_time_error of separated_, but at least the next
+// double.
 double TurningSearch::LatestContactTime() const {
   double latest = std::min(1.0, separated_ + options_.max_time_error);
   const SumWithError width = TwoSum(latest, -separated_);
@@ -410,10 +413,10 @@ absl::StatusOr<bool> TurningSearch::StaysWithinResolution() {
   return *tolerable == 1;
 }
 
-// Returns the time up to which the separation is proven to be at least -resolution_ from separated_
-// on; if `thorough`, usually the latest such time.
+// Returns a time such that the separation is proven to be at least -resolution_ from separated_ to
+// that time; if `thorough`, usually the latest such time.
 absl::StatusOr<double> TurningSearch::TolerableUntil(bool thorough) {
-  // Twice this, over the least length of a normal, is within the resolution.
+  // Twice this, divided by the minimum length of a normal, is within the resolution.
   const double margin = -0.4 * resolution_;
   Vector n = direction_;
   double time = separated_;
@@ -453,13 +456,14 @@ absl::StatusOr<double> TurningSearch::TolerableUntil(bool thorough) {
   return time;
 }
 
-// No plane can be proven from separated_ on: the gap is below rounding, if planes are usable.
+// Concludes a search in which no plane can be proven from separated_ on: if planes are usable, the
+// gap is below rounding.
 absl::StatusOr<FirstContact> TurningSearch::ConcludeStuck() {
   const double latest = LatestContactTime();
   const absl::StatusOr<Relation> relation = RelationAt(latest);
   if (!relation.ok()) return relation.status();
   if (*relation != Relation::kSeparated) return Contact(latest, *relation);
-  // Where planes are unusable, the hulls may be far apart before they meet.
+  // If planes are unusable, the hulls may be far apart before they meet.
   absl::StatusOr<bool> near = plane_.IsUsableAt(separated_);
   if (*near) near = PairAt(a_, b_, separated_).IsWithin(resolution_, options_.should_stop);
   if (!near.ok()) return near.status();
@@ -487,8 +491,9 @@ absl::StatusOr<FirstContact> TurningSearch::ConcludeStuck() {
       "of range; add a pose between them");
 }
 
-// Returns a time of contact, early if that is simple, or a time above 1 if none is found soon, or
-// the hulls, apart at `latest`, are first farther apart than the resolution.
+// Returns a time of contact, an early one if that is cheap to find. Returns a time above 1 if none
+// is found soon, or if the hulls, which are apart at `latest`, first move farther apart than the
+// resolution.
 absl::StatusOr<double> TurningSearch::FindContactSoon(double latest) const {
   double time = latest;
   for (int i = 0; i < kMostSoonTimes && time < 1; ++i) {
@@ -504,9 +509,9 @@ absl::StatusOr<double> TurningSearch::FindContactSoon(double latest) const {
   return 2;
 }
 
-// Returns a time of contact, early if that is simple, or a time above 1 if none is found. The
-// separation between separated_ and it is below rounding, and not proven. The hulls probably meet
-// at `likely`, or soon after.
+// Returns a time of contact, an early one if that is cheap to find, or a time above 1 if none is
+// found. Between separated_ and the result, the separation is below rounding and not proven. The
+// hulls probably meet at `likely` or soon after.
 absl::StatusOr<double> TurningSearch::FindLateContact(double likely) const {
   for (double length = 0;; length = std::max(kShortestStep, kGrowth * length)) {
     const double time = std::min(1.0, likely + length);
@@ -517,8 +522,8 @@ absl::StatusOr<double> TurningSearch::FindLateContact(double likely) const {
   }
 }
 
-// Returns a time of contact at most max_time_error after one without, if doubles allow it.
-// `contact` is a time of contact.
+// Returns a time of contact at most max_time_error after a time without contact, if doubles allow
+// it. `contact`: a time of contact.
 absl::StatusOr<double> TurningSearch::FindEarlierContact(double contact) const {
   double apart = separated_;
   while (contact - apart > options_.max_time_error) {

@@ -17,32 +17,32 @@
 namespace hulld {
 
 // Finds the first contact of two hulls, at least one of which rotates, by conservative advancement
-// (Mirtich 1996). Each step finds the direction in which the hulls are nearest, and the longest
-// interval for which MovingPlane proves that a plane across it separates them. The next step starts
-// at the end of that interval. If the interval would be shorter than max_time_error, an exact query
-// at a double checks for contact.
+// (Mirtich 1996). Each step finds the direction in which the hulls are nearest, and a long interval
+// over which MovingPlane proves that a plane separates them. The next step starts at the end of
+// that interval. If the interval would be shorter than max_time_error, an exact query at a double
+// checks for contact.
 //
-// A plane of constant direction takes most of the gap along it, so a transversal contact needs few
-// steps. Past a graze, the nearest direction turns before the gap closes; there the plane turns,
-// too, from the direction at one end of the interval to that at the other. It loses the square of
-// the interval's length, so a graze needs a number of steps proportional to the logarithm of its
-// gap.
+// A plane of constant direction covers most of the gap along it, so a transversal contact needs few
+// steps. Near a graze, the nearest direction turns before the gap closes; there, the plane also
+// turns, from the direction at one end of the interval to that at the other. Its loss is quadratic
+// in the length of the interval, so the number of steps past a graze is proportional to the
+// logarithm of its gap.
 //
-// Before these steps, the search tries to prove the motion by few planes between the times at which
-// the hulls seem to be nearest. If the gaps along the nearest directions at two times were linear,
-// and the hulls polyhedra that translate, the hulls would be nearest where both gaps are equal. So
-// a miss, however near, needs few planes, and the time of a contact is known roughly.
+// Before these steps, the search tries to prove separation over the whole motion with a few planes
+// between the times at which the hulls seem to be nearest. If the hulls were translating polyhedra,
+// with linear gaps along the nearest directions at two times, they would be nearest where both gaps
+// are equal. So a miss, however near, needs few planes, and the time of a contact is roughly known.
 //
-// Near a contact, a step first tries to leap to just before the contact that a parabola predicts,
-// from the present gap, its rate, and the previous gap. The first prediction's error tells how near
-// the next leap may lead. Leaps converge superlinearly, and leave few exact queries. After k wrong
-// predictions in a row, k steps do not leap.
+// Near a contact, a step first tries to leap to just before the contact that a parabola predicts
+// from the current gap, its rate, and the previous gap. The error of each prediction determines how
+// near to the contact the next leap may end. Leaps converge superlinearly and leave few exact
+// queries. After k consecutive wrong predictions, k steps do not leap.
 //
-// Once the gap is within the resolution, planes that the hulls may cross by the resolution decide
-// if the least separation of the remaining motion is within it, too.
+// Once the gap is within the resolution, planes that the hulls may cross by up to the resolution
+// decide if the minimum separation over the remaining motion is also within it.
 class TurningSearch {
  public:
-  // All arguments must outlive the search. Requires: neither hull is empty, valid motions.
+  // All arguments must outlive the search. Requires: neither hull is empty, and valid motions.
   TurningSearch(const MovingHull& a, const MovingHull& b, const MotionOptions& options);
 
   // CANCELLED: should_stop returned true. INVALID_ARGUMENT: a rotation nearly vanishes, or sizes
@@ -50,7 +50,7 @@ class TurningSearch {
   absl::StatusOr<FirstContact> Run();
 
  private:
-  // A plane from a time on.
+  // A plane that starts at some time.
   struct Plane {
     MovingPlane::Result found;
     Vector end_direction;
@@ -62,7 +62,7 @@ class TurningSearch {
     Plane plane;
     // The gap along the direction at separated_.
     double gap;
-    // The earliest time at which the plane failed, or contact is likely; above 1 if none.
+    // The earliest time at which the plane failed or contact is likely; above 1 if none.
     double failed;
   };
 
@@ -108,22 +108,24 @@ class TurningSearch {
   // Length of the last step, and the direction at its end; the next ones start from them.
   double last_length_ = 1;
   Vector direction_ = Vector::Zero();
-  // direction_ is the nearest one at separated_.
+  // True if direction_ is the nearest direction at separated_.
   bool is_nearest_ = false;
-  // A time at which floating point saw no gap; above 1 if none.
+  // A time at which floating point found no gap; above 1 if none.
   double contact_ = 2;
-  // The nearest direction turns faster than the gap closes.
+  // True if the nearest direction turns faster than the gap closes.
   bool turns_ = false;
   double last_gap_ = std::numeric_limits<double>::infinity();
-  // Wrong predictions in a row, and the number of steps until the next one.
+  // Number of consecutive wrong predictions, and number of steps until the next prediction.
   int failed_leaps_ = 0;
   int steps_to_leap_ = 0;
-  // The contact that the last leap predicted, and its distance then; 0 after one that failed.
+  // The contact time that the last leap predicted, and its distance at that time; 0 after a failed
+  // leap.
   double likely_contact_ = 0;
   double leap_length_ = 0;
-  // The pairs that were last nearest in floating point.
+  // The vertex pairs of the most recent nearest points, in floating point.
   FloatCombination nearest_pairs_;
-  // Directions are exact but for their rounding: the hulls are too near for floating point.
+  // True if directions are exact except for their rounding: the hulls are too near for floating
+  // point.
   bool exact_ = false;
 };
 
