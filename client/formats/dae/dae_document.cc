@@ -20,7 +20,7 @@ absl::Status DaeDocument::Load() {
     FailAt(copy_ + zero, "a NUL byte; is the file text, and complete?");
     return status_;
   }
-  // Line ends stay as they are: LineAt counts them.
+  // Preserves line ends, because LineAt counts them.
   const pugi::xml_parse_result parsed = xml_.load_buffer(
       text_.data(), text_.size(),
       pugi::parse_cdata | pugi::parse_escapes | pugi::parse_wconv_attribute, pugi::encoding_utf8);

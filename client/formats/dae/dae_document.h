@@ -22,7 +22,7 @@ namespace hulld {
 // each other by ID. Namespace prefixes are ignored. Entities other than those of XML itself are
 // not expanded.
 //
-// The first error is kept; after it, results are empty or zero, and callers return.
+// Stores the first error; after it, results are empty or zero, and callers return.
 class DaeDocument {
  public:
   // source: must outlive this.
@@ -33,8 +33,8 @@ class DaeDocument {
 
   const absl::Status& status() const { return status_; }
   bool ok() const { return status_.ok(); }
-  // Keep an error, unless there is an earlier one. node: not null, and the subject of the sentence.
-  // place: in a name or text of the document, for the line.
+  // Store an error unless an earlier one is stored. node: not null; the subject of the message.
+  // place: a position in a name or text of the document, which determines the line.
   void Fail(pugi::xml_node node, const std::string& predicate);
   void FailAt(const char* place, const std::string& message);
   void Keep(const absl::Status& status);
@@ -51,15 +51,16 @@ class DaeDocument {
   static pugi::xml_node ChildOf(pugi::xml_node node, std::string_view name);
   // Returns true if the attribute refers to `target`: "#" and its ID.
   static bool RefersTo(pugi::xml_node node, const char* attribute, pugi::xml_node target);
-  // Returns the geometry, node, or visual_scene (name) to which the attribute `url` refers. An
-  // error if there is none, or several have the ID.
+  // Returns the geometry, node, or visual_scene (name) to which the attribute `url` refers. Error:
+  // no such element exists, or several have this ID.
   pugi::xml_node TargetOf(pugi::xml_node node, const std::string& name);
 
-  // Returns a number below 2^32. absent: the result if the attribute is missing.
+  // Returns an attribute that is a number below 2^32. absent: the result if the attribute is
+  // missing.
   uint64_t IntegerOf(pugi::xml_node node, const char* attribute, uint64_t absent);
-  // Returns the text of an element as `count` finite numbers. Zeros on an error.
+  // Returns the text of an element as `count` finite numbers; zeros on error.
   std::vector<double> NumbersOf(pugi::xml_node node, size_t count);
-  // Parses a word of a text by `parse`, for example ParseDouble.
+  // Parses a word of a text with `parse`, for example ParseDouble.
   template <typename Parse>
   double NumberOf(std::string_view word, const Parse& parse) {
     double number = 0;
@@ -69,8 +70,8 @@ class DaeDocument {
     return number;
   }
 
-  // Calls take(word) for the words of the text of an element until the first error. Returns their
-  // number.
+  // Calls take(word) for each word in the text of an element, until the first error. Returns the
+  // number of calls.
   template <typename Take>
   size_t ForEachWord(pugi::xml_node node, const Take& take) {
     size_t count = 0;
@@ -91,7 +92,7 @@ class DaeDocument {
   absl::Status status_;
   std::string text_;
   pugi::xml_document xml_;
-  // The parser's copy of the text, in which names and texts lie at the same offsets.
+  // The parser's copy of the text; names and texts have the same offsets there.
   const char* copy_ = nullptr;
   LengthScale unit_;
   // Elements by name and ID.

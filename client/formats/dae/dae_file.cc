@@ -24,7 +24,7 @@ namespace {
 using pugi::xml_node;
 using Vector = std::array<double, 3>;
 
-// Limits for files that show their nodes in each other many times over.
+// Limits for files whose nodes instantiate each other very many times.
 constexpr int kMostLevels = 256;
 constexpr size_t kMostElements = size_t{1} << 20;
 constexpr size_t kMostCorners = size_t{1} << 28;
@@ -49,11 +49,11 @@ double CosineOfDegrees(double angle) {
   return SineOfDegrees(90 - std::abs(std::remainder(angle, 360)));
 }
 
-// A mesh, placed by a node.
+// A mesh placed by a node.
 struct PlacedMesh {
-  // ID of the node, or else its name.
+  // ID of the node, or its name if it has no ID.
   std::string node;
-  // Number of the node among those visited.
+  // Number of the node in the order of visits.
   size_t number;
   const TriangleMesh& mesh;
   // Returns an error at the line of the geometry.
@@ -95,7 +95,7 @@ class DaeWalk {
       is_shown = true;
       VisitNode(document_.TargetOf(shown, "visual_scene"), Affine(), 0);
     }
-    // Without a scene, all visual scenes are shown; without these, all geometries.
+    // Without a scene, visits all visual scenes; without these, all geometries.
     for (const std::string_view kind : {"visual_scene", "geometry"}) {
       if (is_shown) return;
       for (const xml_node library : root.children()) {
@@ -144,7 +144,7 @@ class DaeWalk {
     }
   }
 
-  // number: the node's.
+  // number: that of the node.
   void VisitGeometry(xml_node geometry, xml_node node, size_t number, const Affine& X_WN) {
     if (!ok()) return;
     const bool is_moved = X_WN.m != Affine().m;
@@ -241,7 +241,7 @@ class DaeWalk {
     return X;
   }
 
-  // Turns the first axis by the angle towards the second one, at right angles to it.
+  // Shears the first axis by the angle toward the second one, which is perpendicular to it.
   Affine Skew(xml_node element, const std::vector<double>& v) {
     const Vector from = UnitVector(element, {v[1], v[2], v[3]});
     const Vector to = UnitVector(element, {v[4], v[5], v[6]});
@@ -260,7 +260,7 @@ class DaeWalk {
   DaeDocument document_;
   std::array<LengthScale, 3> scale_;
   PlacedMeshVisitor visit_;
-  // Meshes by geometry, and whether they are moved.
+  // Meshes by geometry, and by whether a transform moves them.
   std::map<std::pair<pugi::xml_node_struct*, bool>, TriangleMesh> meshes_;
   size_t number_ = 0;
   size_t elements_ = 0;

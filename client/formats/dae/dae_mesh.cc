@@ -92,8 +92,8 @@ class DaeMeshReader {
     }
   }
 
-  // Returns the places of x, y, and z within an element: those of the parameters with these names,
-  // or else the first three.
+  // Returns the positions of x, y, and z within an element: those of the parameters with these
+  // names, or the first three if no parameter has such a name.
   std::array<size_t, 3> PlacesOf(xml_node accessor) {
     std::array<std::optional<size_t>, 3> named;
     size_t place = 0;

@@ -64,9 +64,9 @@ class ExpandingSurface {
                {{2, 3, 0}, {2, 1, 0}, {1, 0, 2}}};
   }
 
-  // Removes the facets that are connected to `start` through facets for which visible(facet) holds,
-  // and closes the gap by triangles from its edge to the vertex `apex`. Returns the index of the
-  // first of these triangles, which are the last facets. If the edge of the gap is not a single
+  // Removes the facets that are connected to `start` through facets for which visible(facet) is
+  // true, and closes the gap by triangles from its edge to the vertex `apex`. Returns the index of
+  // the first of these triangles, which are the last facets. If the edge of the gap is not a single
   // closed loop, returns nothing and leaves an unusable surface. `start` is assumed visible.
   template <typename Visible>
   std::optional<uint32_t> Expand(uint32_t start, uint32_t apex, Visible visible) {

@@ -16,7 +16,7 @@ namespace {
 
 using Facet = std::array<VertexPair, 3>;
 
-// Four doubles in the registers of the compilation target; a vector takes three.
+// Four doubles in the registers of the compilation target; a vector uses three.
 using Lanes = double __attribute__((vector_size(32)));
 
 // A vector in double-double arithmetic: DoubleDouble's operations on each component, with the same
@@ -138,9 +138,9 @@ struct LongRotation {
   }
 };
 
-// True if the facet has three different pairs of only four vertices. All of its vertices of A then
-// have the same value along its normal, and so do its vertices of B. Moves a pair that shares a
-// vertex with both other pairs to the front.
+// True if the facet has three different pairs with only four vertices in total. All of its vertices
+// of A then have the same value along its normal, and so do its vertices of B. Moves a pair that
+// shares a vertex with both other pairs to the front.
 bool IsOfFourVertices(Facet& facet) {
   const auto shares = [](VertexPair p, VertexPair q) { return (p.a == q.a) != (p.b == q.b); };
   for (int i = 0; i < 3; ++i) {
@@ -202,7 +202,7 @@ struct CrossingTime {
 };
 
 // Returns nothing if the error may exceed the bound. Requires: IsOfFourVertices(facet), and poses
-// that are no products.
+// that are not products.
 [[gnu::always_inline]] inline std::optional<CrossingTime> FindCrossingIn(const FloatPair& start,
                                                                          const RelativePath& path,
                                                                          const Motion& X_WA,
@@ -253,7 +253,7 @@ __attribute__((target("avx2"), flatten)) std::optional<CrossingTime> FindCrossin
 constexpr auto FindCrossingAvx2 = FindCrossingPortably;
 #endif
 
-// Returns the doubles around the time, if it is certainly inside [0, 1] and no double.
+// Returns the doubles around the time, if it is certainly inside [0, 1] and not a double.
 std::optional<BetweenTimes> Around(const CrossingTime& time) {
   const double nearest = time.value.high;
   if (!(nearest > 0 && nearest <= 1)) return std::nullopt;

@@ -34,9 +34,9 @@ struct FloatSearchResult {
 FloatSearchResult SearchInFloatingPoint(const FloatPair& pair, double tolerance,
                                         const PlainVector& first);
 
-// Proves the cached suggestion of an earlier query at the present poses; undecided if that fails.
-// Then, if hulls that touched may touch along the same axis, the result holds that axis and the
-// cached pairs; otherwise it holds no pairs. Requires: pair.usable(), and that the pairs of the
+// Proves the cached suggestion of an earlier query at the current poses; undecided if that fails.
+// Then, if hulls that touched may touch along the same axis, the result contains that axis and the
+// cached pairs; otherwise it contains no pairs. Requires: pair.usable(), and that the pairs of the
 // cache are vertices of these hulls.
 FloatSearchResult TryCached(const FloatPair& pair, const PairCache& cache);
 

@@ -72,7 +72,7 @@ class SmallPair {
   // Four doubles, and four integers of the same width, in the registers of the compilation target.
   using Lanes = double __attribute__((vector_size(32)));
   using LaneIds = int64_t __attribute__((vector_size(32)));
-  // The low bits of a value that hold its vertex number.
+  // The low bits of a value, which contain its vertex number.
   static constexpr int64_t kIdMask = kMostVertices - 1;
 
   struct Side {

@@ -211,7 +211,7 @@ void LiveHull::Prepare(const Mark& mark) {
 
   const std::lock_guard changing(changing_);
   const LiveParts& current = *now_.parts_;
-  // If the dimension grew during the preparation, a new base holds all points.
+  // If the dimension grew during the preparation, a new base contains all points.
   if (current.covered > mark.count_) return;
   after.tail = CopyOf(current.tail.get(), mark.count_ - current.covered,
                       now_.count_ - current.covered, after.base->center());

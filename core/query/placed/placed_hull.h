@@ -18,8 +18,7 @@ class PlacedHull {
  public:
   // `hull` must outlive the result. INVALID_ARGUMENT: see ValidatePose.
   static absl::StatusOr<PlacedHull> Make(const QueryHull& hull, const Pose& X_WH);
-  // Takes a pose that has been validated. Requires: a valid pose (ValidatePose), and a radius that
-  // is finite and not negative.
+  // Requires: a valid pose (ValidatePose), and a radius that is finite and not negative.
   PlacedHull(const QueryHull& hull, const Pose& X_WH, double radius = 0);
   // Places a piece of a body. Both arguments must outlive the result. Exact queries use the exact
   // product, not its rounding, and the exact sum of both radii.

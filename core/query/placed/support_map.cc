@@ -296,14 +296,14 @@ class SupportMap::Filling {
     return *lists_[index];
   }
 
-  // Filters into a list that takes memory for the result alone.
+  // Filters into a list that allocates memory only for the result.
   void FilterInto(const FacePoints& from, const Square& square, FacePoints& to) {
     if (poll_.Step(1 + from.size / kPointsPerStep)) return;
     Filter(from, square, bound_, filtered_);
     to.CopyFrom(filtered_);
   }
   // Frees a long list that is no longer needed. Without this, a set with many points in one cell
-  // takes a copy of them for each division.
+  // needs a copy of them for each division.
   static void Release(FacePoints& list) {
     if (list.size > kMostKept) list = FacePoints();
   }

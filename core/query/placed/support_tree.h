@@ -14,7 +14,7 @@
 namespace hulld {
 
 // A tree of boxes around points that finds the points farthest along a direction by branch and
-// bound. Takes O(V) memory for every set, including sets that defeat a division of the directions
+// bound. Uses O(V) memory for every set, including sets that defeat a division of the directions
 // (see SupportMap).
 //
 // The bound of a box is computed like the values of points. Rounding is monotonic, so no computed
