@@ -19,16 +19,16 @@ MotionOptions WithCertificate() {
   return options;
 }
 
-// Tallies of a sweep.
+// Counts of the outcomes of a sweep.
 struct Counts {
   int separated = 0;
   int meeting = 0;
-  // Decided by the cast and the entry alone.
+  // Decided by the cast or the entry alone.
   int by_cast = 0;
   int by_entry = 0;
 };
 
-// The cast and the entry never contradict a proof in rationals.
+// Checks that the cast and the entry do not contradict a proof in rationals.
 void Check(const OwnMoving& a, const OwnMoving& b, Counts& counts) {
   const MovingHull moving_a = a.moving();
   const MovingHull moving_b = b.moving();
@@ -87,7 +87,7 @@ TEST(PathCast, RandomPairsAgreeWithTheirProofs) {
     }
     EXPECT_GT(counts.separated, 5);
     EXPECT_GT(counts.meeting, 15);
-    // The exact steps are needed for few.
+    // Few pairs need the exact steps.
     EXPECT_GE(counts.by_cast + 1, counts.separated);
     EXPECT_GE(counts.by_entry + 2, counts.meeting);
   }
@@ -111,7 +111,7 @@ TEST(PathCast, RandomRaysAgreeWithTheirProofs) {
   EXPECT_GE(counts.by_entry + 4, counts.meeting);
 }
 
-// Slivers, needles, and far offsets, where the bounds are wide compared with the shapes.
+// Slivers, needles, and distant offsets: the bounds are wide compared with the shapes.
 TEST(PathCast, IllShapedPairsAgreeWithTheirProofs) {
   Random random(TestSeed(3));
   Counts counts;

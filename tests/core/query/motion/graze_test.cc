@@ -25,7 +25,7 @@ std::vector<Vector> Octahedron() {
   return {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}};
 }
 
-// Turns about an axis by 45 degrees to either side. At time 1/2 the rotation is the identity.
+// Returns a turn about an axis from -45 to 45 degrees. At time 1/2, the rotation is the identity.
 Motion Swinging(const Vector& axis) {
   const double c = std::cos(M_PI / 8);
   const Vector v = std::sin(M_PI / 8) * axis;
@@ -41,7 +41,7 @@ struct Part {
   Pose X_BH = {};
 };
 
-// A swings past B with a least separation of zero, at time 1/2 along x.
+// A swings past B with a minimum separation of zero, reached at time 1/2 along x.
 struct Passage {
   std::string name;
   Part a;
@@ -173,7 +173,7 @@ TEST(Graze, ShallowContactsAreFound) {
   }
 }
 
-// The separation is least at time 1/2, and positive there if and only if the gap is.
+// The separation is smallest at time 1/2, and positive there if and only if the gap is positive.
 TEST(Graze, AnswersAgreeWithDenseSamples) {
   std::vector<Rational> times = {Rational(1, 2)};
   for (int i = 0; i <= 16; ++i) times.push_back(Rational(i, 16));
@@ -204,8 +204,7 @@ TEST(Graze, AnswersAgreeWithDenseSamples) {
   }
 }
 
-// A tip passes the wall, no matter how close, and a longer one meets it after another quarter
-// turn.
+// A tip passes the wall, however close, and a longer tip meets it after another quarter turn.
 TEST(Graze, ContactAfterAGrazeIsFound) {
   std::vector<Vector> tips = Octahedron();
   tips[3] = {0, -1.01, 0};

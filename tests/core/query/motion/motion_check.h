@@ -21,7 +21,7 @@
 
 namespace hulld {
 
-// A hull or piece in motion that owns its hull and its points for the oracle.
+// A hull or piece in motion that owns its hull, and its points for the oracle.
 class OwnMoving {
  public:
   OwnMoving(const std::vector<Vector>& points, const Motion& motion, double radius = 0,
@@ -53,14 +53,15 @@ inline Vector LatticeVector(Random& random, int most) {
           static_cast<double>(random.Between(-most, most))};
 }
 
-// Returns a pose of a piece: one of a few rotations of any length, and a lattice vector.
+// Returns a random pose of a piece: one of a few rotations with quaternions of any length, and a
+// lattice vector.
 inline Pose LatticePiecePose(Random& random, int most) {
   constexpr std::array<std::array<double, 4>, 6> kRotations = {
       {{1, 1, 0, 0}, {1, 2, 2, 0}, {0, 3, 0, 4}, {2, 0, -1, 1}, {-3, 0, 0, 0}, {1, -1, 1, 1}}};
   return {kRotations[random.Below(kRotations.size())], LatticeVector(random, most)};
 }
 
-// Returns a pose with a rotation about any axis.
+// Returns a random pose with a rotation about any axis.
 inline Pose RandomPose(Random& random, double length) {
   Pose pose;
   for (double& component : pose.q) component = random.Real(-1, 1);
@@ -68,7 +69,8 @@ inline Pose RandomPose(Random& random, double length) {
   return pose;
 }
 
-// True if the bracket is the first time if that is a double, and otherwise the doubles around it.
+// Succeeds if the bracket is the first time itself, if that is a double, or otherwise the doubles
+// around it.
 inline testing::AssertionResult IsBracketOf(const FirstContact& contact,
                                             const oracle::Rational& first) {
   if (!contact.contact_time) return testing::AssertionFailure() << "no contact";
@@ -109,8 +111,8 @@ inline std::vector<oracle::SeparatedInterval> ToOracle(
   return result;
 }
 
-// True if an answer with a certificate is proven by it, in the oracle's arithmetic: the separation
-// up to separated_until, and the contact at contact_time.
+// Succeeds if the certificate proves the answer in the oracle's arithmetic: the separation up to
+// separated_until, and the contact at contact_time.
 inline testing::AssertionResult ContactIsProven(const OwnMoving& a, const OwnMoving& b,
                                                 const FirstContact& contact) {
   const oracle::MovingPoints points_a = a.ForOracle();

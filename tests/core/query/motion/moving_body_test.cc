@@ -16,12 +16,12 @@ namespace moving_body_test {
 
 using oracle::Rational;
 
-// A body in motion, and each piece by itself.
+// A body in motion, and each of its pieces as a separate hull in motion.
 struct OwnMovingBody {
   explicit OwnMovingBody(const Motion& X_WB, double radius_in = 0)
       : motion(X_WB), radius(radius_in) {}
 
-  // Requires: radii with an exact sum.
+  // Requires: radii whose sum is a double.
   void Add(const std::vector<Vector>& points, double piece_radius = 0, const Pose& X_BP = {}) {
     body.Add(points, X_BP, piece_radius);
     if (!points.empty()) pieces.emplace_back(points, motion, radius + piece_radius, X_BP);
@@ -34,7 +34,7 @@ struct OwnMovingBody {
   Motion motion;
   double radius;
   OwnBody body;
-  // The pieces that are not empty.
+  // The nonempty pieces.
   std::vector<OwnMoving> pieces;
 };
 
@@ -52,7 +52,7 @@ Motion RandomMotion(Random& random, double length, bool turns) {
   return motion;
 }
 
-// Returns the fault of the certificates of an answer, or an empty text.
+// Returns the fault of the certificates of an answer, or an empty string.
 std::string FaultOf(const OwnMovingBody& a, const OwnMovingBody& b, const BodyContact& found) {
   const Rational until(found.contact.separated_until);
   const bool meets = found.contact.contact_time.has_value();
@@ -158,7 +158,7 @@ TEST(MovingBody, MeetsAsTheEarliestOfItsPieces) {
   EXPECT_GT(ended_early, 5);
 }
 
-// The point meets a triangle and a cube at half time, and only overlaps the cube.
+// The point meets a triangle and a cube at time 1/2, and overlaps only the cube.
 TEST(MovingBody, TheStrongestOfSimultaneousContactsDecides) {
   OwnMovingBody wall(Translation({0, 0, 0}, {0, 0, 0}));
   wall.Add({{1, -5, -5}, {1, 5, -5}, {1, 0, 5}});

@@ -17,7 +17,7 @@ namespace swept_box_test {
 using oracle::Rational;
 
 // Returns -1 if the boxes are disjoint at each time up to `until`, 0 if they meet at one time only,
-// and otherwise 1; in rationals.
+// and 1 otherwise. Computed in rationals.
 int BruteForceMeeting(const MovingBox& a, const MovingBox& b, double until = 1) {
   Rational begin = 0;
   Rational end(until);
@@ -62,7 +62,7 @@ void Check(const MovingBox& a, const MovingBox& b, Counts& counts) {
 }
 
 // Rays through corners and edges of boxes, along faces, and just beside them, at any scale. Thirds
-// make every difference round.
+// force rounding in every difference.
 TEST(SweptBox, NoPairThatMeetsIsDropped) {
   Random random(TestSeed(1));
   for (const double scale : {0x1p-1070, 1e-300, 1e-100, 1 / 3.0, 1.0, 1e100, 1e300, 0x1p1019}) {
@@ -121,8 +121,7 @@ TEST(SweptBox, ObliqueRaysPassBoxesWithinTheBoxAroundThem) {
       MayMeet(ray, {{Vector(1, 1, 1), Vector(2, 9, 2)}, {Vector(1, 1, 1), Vector(2, 9, 2)}}));
 }
 
-// A scene of hulls in motion, and rays before them: candidates are all pairs that meet, and few
-// others.
+// A scene of moving points and hulls: the candidates are all pairs that meet, and few others.
 TEST(SweptBox, ScenesInMotionMissNoContact) {
   Random random(TestSeed(2));
   std::vector<OwnMoving> movings;

@@ -49,7 +49,7 @@ FirstContact Find(const OwnMoving& a, const OwnMoving& b) {
   return *std::move(contact);
 }
 
-// Tallies of a sweep.
+// Counts of the outcomes of a sweep.
 struct Counts {
   std::array<int, 3> relations = {};
   int exact = 0;
@@ -181,7 +181,7 @@ TEST(Translation, GrazingPairsTouch) {
   const FirstContact brief = Find(a, corner);
   EXPECT_EQ(brief.relation, Relation::kTouching);
   EXPECT_TRUE(IsBracketOf(brief, Rational(1, 3)));
-  // A graze moved away by the smallest amount misses.
+  // A graze moved away by the smallest possible amount misses.
   const OwnMoving apart(Cube(1), Straight({5, std::nextafter(2.0, 3.0), 0}, {-5, 2.5, 0}));
   EXPECT_EQ(Find(a, apart).relation, Relation::kSeparated);
 }
@@ -233,12 +233,12 @@ TEST(Translation, ExtremeScalesAreExact) {
     const FirstContact contact = Find(a, b);
     EXPECT_EQ(contact.relation, Relation::kOverlapping);
     EXPECT_EQ(contact.contact_time, 0.75);
-    // Shapes of widely different size.
+    // Shapes of widely different sizes.
     const OwnMoving speck(Scaled(Cube(1), scale * 1e-100 * 1e100 * 0x1p-60),
                           Straight(Vector(scale * Vector(0, 8, 0)), Vector::Zero()));
     EXPECT_EQ(Find(a, speck).relation, Relation::kOverlapping);
   }
-  // A time near 0, whose doubles are dense.
+  // A time near 0, where doubles are dense.
   const OwnMoving a(Cube(1), Straight({0, 0, 0}, {0, 0, 0}));
   const OwnMoving fast(Cube(1), Straight({2 + 0x1p-40, 0, 0}, {-1e150, 0, 0}));
   const FirstContact early = Find(a, fast);
@@ -246,7 +246,7 @@ TEST(Translation, ExtremeScalesAreExact) {
   EXPECT_LT(*early.contact_time, 1e-150);
 }
 
-// Beyond the range of floating point, exact queries alone find the contact.
+// Beyond the range of floating point, only exact queries find the contact.
 TEST(Translation, ScaledPairsMeetAtTheSameTime) {
   const std::vector<Vector> triangle = {{9, -6, -1}, {-13, -5, 9}, {-1, 4, -3}};
   const std::vector<Vector> solid = {{3, 0, -5}, {5, -5, -5}, {-5, 2, -2}, {0, -2, 2}, {3, -4, 1}};
@@ -333,7 +333,7 @@ TEST(Motion, InvalidMotionsAreRefused) {
   Motion vanishing = Straight({5, 0, 0}, {6, 0, 0});
   vanishing.end.q = {-2, 0, 0, 0};
   EXPECT_NE(message_of(vanishing).find("opposite"), std::string::npos);
-  // Not exactly opposite, so it vanishes nowhere.
+  // Not exactly opposite, so the rotation does not vanish.
   vanishing.end.q = {-2, 1e-300, 0, 0};
   EXPECT_TRUE(ValidateMotion(vanishing).ok());
   Motion invalid = Straight({5, 0, 0}, {6, 0, 0});

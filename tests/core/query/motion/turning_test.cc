@@ -22,7 +22,7 @@ std::vector<Vector> Box(double x, double y, double z) {
 
 Motion AtRest(const Vector& t = Vector::Zero()) { return {{{1, 0, 0, 0}, t}, {{1, 0, 0, 0}, t}}; }
 
-// Turns about z by up to an angle.
+// Returns a turn about z from 0 to an angle.
 Motion Spinning(double angle, const Vector& from, const Vector& to) {
   return {{{1, 0, 0, 0}, from}, {{std::cos(angle / 2), 0, 0, std::sin(angle / 2)}, to}};
 }
@@ -45,8 +45,8 @@ FirstContact Find(const OwnMoving& a, const OwnMoving& b, MotionOptions options 
   return *std::move(contact);
 }
 
-// True if no sample contradicts the answer, exactly: separated up to separated_until, and if there
-// is no contact, to the end.
+// Succeeds if no sample contradicts the answer, exactly: separated up to separated_until, or to the
+// end if there is no contact.
 testing::AssertionResult AgreesWithSamples(const OwnMoving& a, const OwnMoving& b,
                                            const FirstContact& contact, int samples) {
   for (int i = 0; i <= samples; ++i) {
@@ -60,7 +60,7 @@ testing::AssertionResult AgreesWithSamples(const OwnMoving& a, const OwnMoving& 
   return testing::AssertionSuccess();
 }
 
-// Returns the motion between two poses on the shorter of its two paths.
+// Returns the motion between two poses along the shorter of the two rotations.
 Motion Between(const Pose& start, Pose end) {
   double dot = 0;
   for (int i = 0; i < 4; ++i) dot += start.q[i] * end.q[i];
@@ -202,8 +202,8 @@ TEST(Turning, MissesBelowTheAccuracyOfPlanesAreWithinTolerance) {
   EXPECT_LT(near.separated_until, 1);
 }
 
-// A point on a circle about the other hull: the plane of a step comes within the resolution, the
-// pair does not.
+// A point moves on a circle about the other hull: the plane of a step comes within the resolution,
+// but the pair does not.
 TEST(Turning, PairsFartherApartThanTheResolutionAreDecided) {
   const Motion quarter = {{{1, 0, 0, 0}, Vector::Zero()}, {{1, 0, 0, 1}, Vector::Zero()}};
   for (const double resolution : {0.001, 0.02, 0.05, 0.5}) {
@@ -259,8 +259,8 @@ TEST(Turning, TheBracketIsAsNarrowAsRequested) {
 
 TEST(Turning, ContactAtTheEndsIsExact) {
   const OwnMoving floor(Box(5, 5, 1), AtRest());
-  // Lands flat on the floor, exactly at the end: a turn of 90 degrees about x with q1 = (1, 1, 0,
-  // 0).
+  // The hull lands flat on the floor exactly at the end: a turn of 90 degrees about x with q1 = (1,
+  // 1, 0, 0).
   const OwnMoving lands(Box(1, 1, 1), {{{1, 0, 0, 0}, {0, 0, 6}}, {{1, 1, 0, 0}, {0, 0, 2}}});
   const FirstContact end = Find(floor, lands);
   EXPECT_EQ(end.relation, Relation::kTouching);
@@ -301,13 +301,13 @@ TEST(Turning, RadiiBringTheContactForward) {
   const FirstContact spheres = Find(OwnMoving(center, AtRest(), 0.5), sphere);
   EXPECT_EQ(spheres.relation, Relation::kOverlapping);
   EXPECT_NEAR(*spheres.contact_time, 2.0 / 3, 1e-9);
-  // Offset by the sum of the radii, it grazes; a little farther, it passes.
+  // A sphere offset by slightly less than the sum of the radii meets; by slightly more, it misses.
   const auto beside = [&](double y) {
     return Find(OwnMoving(center, AtRest({0, y, 0}), 0.5), sphere).relation;
   };
   EXPECT_EQ(beside(1.999), Relation::kOverlapping);
   EXPECT_EQ(beside(2.001), Relation::kSeparated);
-  // A turning box with rounded corners reaches farther by its radius.
+  // A turning box with rounded corners reaches farther by the radius.
   const OwnMoving rounded(Box(1, 1, 1), Spinning(M_PI / 2, {0, 0, 0}, {0, 0, 0}), 0.25);
   const auto relation_at = [&](double distance) {
     return Find(rounded, OwnMoving(Box(0.5, 5, 5), AtRest({distance + 0.5, 0, 0}))).relation;
@@ -320,7 +320,7 @@ TEST(Turning, RoundedPairsAtRestHaveTheRelationOfTheirPoses) {
   for (const double scale : {1.0, 0x1p-1000, 0x1p1000}) {
     SCOPED_TRACE(scale);
     const OwnMoving a(Scaled(Box(1, 1, 1), scale), AtRest());
-    // Its rotation is the same at all times. The corner of A is 5 away.
+    // The rotation of B is the same at all times. The distance to the corner of A is 5.
     const Vector t = scale * Vector(4, 5, 0);
     const Motion at_rest = {{{1, 0, 0, 0}, t}, {{3, 0, 0, 0}, t}};
     for (const double radius : {std::nextafter(5.0, 0.0), 5.0, std::nextafter(5.0, 6.0)}) {
@@ -346,7 +346,7 @@ TEST(Turning, ExtremeScalesKeepTheRelation) {
   }
 }
 
-// Out of the range of planes, no bracket is as narrow as requested.
+// Outside the size range of planes, no bracket is as narrow as requested.
 TEST(Turning, RoundedShapesOfExtremeSizeAreRefused) {
   for (const double scale : {0x1p-800, 0x1p920}) {
     std::vector<Vector> cube = Box(0.5, 0.5, 0.5);
@@ -361,7 +361,7 @@ TEST(Turning, RoundedShapesOfExtremeSizeAreRefused) {
   }
 }
 
-// q(t) vanishes if and only if q1 = -s q0. Otherwise it turns by nearly half a turn at once.
+// q(t) vanishes if and only if q1 = -s q0. Near that case, it makes nearly half a turn at once.
 TEST(Turning, OnlyRotationsThatVanishAreInvalid) {
   const OwnMoving far(Box(1, 1, 1), AtRest({0, 0, 9}));
   for (const std::array<double, 4>& q0 :
@@ -378,7 +378,7 @@ TEST(Turning, OnlyRotationsThatVanishAreInvalid) {
         if (q0[i] == 0 && i > 1) continue;
         Motion nearly = motion;
         nearly.end.q[i] = std::nextafter(nearly.end.q[i], 9);
-        // A multiple of the axis of the only component is opposite, too.
+        // If q0 has a single component, a multiple of its axis is also opposite.
         EXPECT_EQ(ValidateMotion(nearly).ok(), !(q0[0] == 1 && i == 0));
         nearly.end.q[i] = motion.end.q[i] + (q0[i] == 0 ? 1e-9 : 1e-9 * scale);
         if (!ValidateMotion(nearly).ok()) continue;
@@ -389,7 +389,7 @@ TEST(Turning, OnlyRotationsThatVanishAreInvalid) {
 }
 
 TEST(Turning, RotationsThatNearlyVanishAreRefusedOrDecided) {
-  // Half a turn within 1e-16 of the time.
+  // q(t) makes half a turn within about 1e-16 of the motion.
   const Motion flip = {{{1, 0, 0, 0}, {0, 0, 0}}, {{-1, 1e-16, 0, 0}, {0, 0, 0}}};
   ASSERT_TRUE(ValidateMotion(flip).ok());
   const OwnMoving b(Box(1, 1, 1), AtRest({0, 0, 4.5}));

@@ -12,14 +12,14 @@
 #include "tests/core/checks/point_sets.h"
 #include "tests/core/query/motion/motion_check.h"
 
-// Rotations with a q(t) that misses zero, by a unit in the last place or more. The rotation then
-// turns by a whole turn within about that share of the motion.
+// Rotations whose q(t) misses zero by a unit in the last place or more. The rotation then makes a
+// full turn within about that share of the motion.
 namespace hulld {
 namespace vanishing_test {
 
 using oracle::Rational;
 
-// Searches that end poll the caller this often at most (Graze.ShallowContactsAreFound).
+// Maximum number of polls in a search that terminates (Graze.ShallowContactsAreFound).
 constexpr int kMostPolls = 2500;
 
 using Quaternion = std::array<double, 4>;
@@ -30,8 +30,8 @@ Quaternion RandomQuaternion(Random& random, double length) {
   return q;
 }
 
-// Returns -factor q, off by `miss` of its length in one component; by a unit in the last place if
-// that is less.
+// Returns -factor q with an error of `miss` times its length in one component, and at least a unit
+// in the last place.
 Quaternion NearlyOpposite(Random& random, const Quaternion& q, double factor, double miss) {
   Quaternion opposite;
   double largest = 0;
@@ -45,7 +45,7 @@ Quaternion NearlyOpposite(Random& random, const Quaternion& q, double factor, do
   return opposite;
 }
 
-// Returns the time at which |q(t)| is least, to the double below.
+// Returns the time at which |q(t)| is smallest, rounded down.
 double LeastTime(const Motion& motion) {
   Rational of_start = 0;
   Rational squared = 0;
@@ -57,7 +57,8 @@ double LeastTime(const Motion& motion) {
   return static_cast<double>(Rational(of_start / squared));
 }
 
-// Times at which the oracle looks for a contact: evenly spaced, and dense around a time.
+// Returns times at which the oracle tests for contact: evenly spaced, and densely around a given
+// time.
 std::vector<Rational> TimesAround(double middle) {
   std::vector<Rational> times;
   for (int i = 0; i <= 8; ++i) times.push_back(Rational(i, 8));
@@ -95,7 +96,7 @@ absl::StatusOr<FirstContact> Find(const OwnMoving& a, const OwnMoving& b, Motion
   return contact;
 }
 
-// True if the answer is proven, and no sample contradicts it.
+// Succeeds if the answer is proven and no sample contradicts it.
 testing::AssertionResult IsRight(const OwnMoving& a, const OwnMoving& b,
                                  const MotionOptions& options, const FirstContact& contact,
                                  const std::optional<Rational>& sampled) {
@@ -142,7 +143,7 @@ struct Counts {
   int met_there_or_after = 0;
 };
 
-// Asks about a pair, A of which has a rotation that nearly vanishes.
+// Queries a pair in which the rotation of A nearly vanishes.
 void Ask(const OwnMoving& a, const OwnMoving& b, const Motion& X_WA, const MotionOptions& options,
          double miss, Counts& counts) {
   const double least = LeastTime(X_WA);
@@ -151,7 +152,8 @@ void Ask(const OwnMoving& a, const OwnMoving& b, const Motion& X_WA, const Motio
   if (!contact.ok()) {
     EXPECT_TRUE(IsRefusal(contact.status())) << contact.status();
     ++counts.refused;
-    // The contract: q(t) is below 2^-38 of its ends, and the pair does not meet before.
+    // The contract: q(t) falls below 2^-38 of its size at the ends, and the pair does not meet
+    // before that.
     EXPECT_LT(miss, 0x1p-34);
     if (sampled) {
       EXPECT_GE(*sampled, Rational(least) - Rational(0x1p-34)) << *sampled;
@@ -181,7 +183,7 @@ TEST(Vanishing, MotionsAreAnsweredOrRefusedAsTheContractSays) {
     const double miss = kMisses[round % 7];
     const double length = kLengths[random.Below(5)];
     const double scale = kScales[random.Below(5)];
-    // The rotation vanishes near one of these: 1/2, 3/4, 1/8, or 2/3.
+    // The rotation vanishes near one of the times 1/2, 3/4, 1/8, or 2/3.
     const double factor = std::array{1.0, 1.0 / 3, 7.0, 0.5}[random.Below(4)];
     Motion X_WA;
     X_WA.start.q = RandomQuaternion(random, length / 8);
@@ -231,8 +233,8 @@ TEST(Vanishing, ASweepBetweenTwoTimesIsNeverMissed) {
   }
 }
 
-// Within the resolution when the rotation vanishes, and in contact much later: no bracket that is
-// as narrow as requested is proven.
+// The pair is within the resolution when the rotation vanishes, and in contact much later: no
+// bracket as narrow as requested can be proven.
 TEST(Vanishing, NoBracketSpansTheTimeAtWhichARotationVanishes) {
   const std::vector<Vector> cube = {{-1, -1, -1}, {-1, -1, 1}, {-1, 1, -1}, {-1, 1, 1},
                                     {1, -1, -1},  {1, -1, 1},  {1, 1, -1},  {1, 1, 1}};
@@ -249,7 +251,7 @@ TEST(Vanishing, NoBracketSpansTheTimeAtWhichARotationVanishes) {
   const absl::StatusOr<FirstContact> contact = Find(at_rest, turning, options);
   ASSERT_TRUE(contact.ok());
   EXPECT_TRUE(IsRight(at_rest, turning, options, *contact, std::nullopt));
-  // Contact before that time is found.
+  // A contact before that time is found.
   const Motion earlier = {{{1, 0, 0, 0}, {2.25, 0, 0}}, {{-1, 0x1p-53, 0, 0}, {1.25, 0, 0}}};
   const OwnMoving meeting(cube, earlier);
   const absl::StatusOr<FirstContact> met = Find(at_rest, meeting, options);
@@ -258,7 +260,7 @@ TEST(Vanishing, NoBracketSpansTheTimeAtWhichARotationVanishes) {
   EXPECT_TRUE(IsRight(at_rest, meeting, options, *met, std::nullopt));
 }
 
-// Where the shapes are out of the range of planes, a radius or a rotation is refused, too.
+// If the shapes are outside the size range of planes, a radius or a rotation is refused, too.
 TEST(Vanishing, NoBracketSpansTimesWithoutPlanes) {
   for (const double scale : {0x1p-800, 0x1p920}) {
     const std::vector<Vector> points = {{0, 0, 0}, {scale, 0, 0}, {0, scale, 0}, {0, 0, scale}};
