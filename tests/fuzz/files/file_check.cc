@@ -48,7 +48,7 @@ std::string CheckRefusal(const absl::Status& status) {
       message.size() > sizeof(kName) + 3) {
     return {};
   }
-  return "a refusal that does not say what is wrong with which file: " + status.ToString();
+  return "a refusal that does not name the file and the fault: " + status.ToString();
 }
 
 using PointReader = absl::Status (*)(ByteSource*, PointCollector*);
@@ -91,9 +91,11 @@ struct PointsRead {
 };
 
 void Take(const PointChunk& block, size_t most, PointsRead* to) {
-  if (!block.xyz.empty() && !block.xyz_float.empty()) to->finding = "a block of two kinds";
-  if (block.size() == 0 || (most > 0 && block.size() > most)) to->finding = "a block of no size";
-  if ((block.xyz.size() + block.xyz_float.size()) % 3 != 0) to->finding = "a block tears a point";
+  if (!block.xyz.empty() && !block.xyz_float.empty())
+    to->finding = "a block contains both xyz and xyz_float";
+  if (block.size() == 0 || (most > 0 && block.size() > most))
+    to->finding = "a block is empty or too large";
+  if ((block.xyz.size() + block.xyz_float.size()) % 3 != 0) to->finding = "a block splits a point";
   to->xyz.insert(to->xyz.end(), block.xyz.begin(), block.xyz.end());
   to->xyz.insert(to->xyz.end(), block.xyz_float.begin(), block.xyz_float.end());
 }
@@ -111,12 +113,12 @@ PointsRead ReadPointsOf(PointReader reader, std::string_view content, const Read
   const auto is_finite = [](double x) { return std::isfinite(x); };
   if (!read.finding.empty()) return read;
   if (!std::all_of(read.xyz.begin(), read.xyz.end(), is_finite)) {
-    read.finding = "a point that is not finite was passed on";
+    read.finding = "a non-finite point was delivered";
   } else if (!read.status.ok()) {
     read.finding = CheckRefusal(read.status);
   } else if (3 * read.counts.points != read.xyz.size()) {
     read.finding = absl::StrCat(read.counts.points, " points counted, but ", read.xyz.size(),
-                                " coordinates passed on");
+                                " coordinates delivered");
   }
   return read;
 }
@@ -131,9 +133,9 @@ FileVerdict CheckPoints(PointReader reader, std::string_view content) {
   options.points_per_block = kSmallBlock;
   const PointsRead pieces = ReadPointsOf(reader, content, options);
   if (!pieces.finding.empty()) return {pieces.finding, false};
-  if (pieces.status != whole.status) return {"the size of blocks decides what is refused", false};
+  if (pieces.status != whole.status) return {"the status depends on the block size", false};
   if (whole.status.ok() && pieces.xyz != whole.xyz) {
-    return {"the size of blocks changes the points", false};
+    return {"the points depend on the block size", false};
   }
   options.skip_nonfinite = true;
   const PointsRead lenient = ReadPointsOf(reader, content, options);
@@ -168,7 +170,7 @@ FileVerdict CheckMesh(absl::Status (*reader)(ByteSource*, TriangleMesh*),
   }
   for (const auto& triangle : mesh.triangles) {
     for (const uint32_t index : triangle) {
-      if (index >= mesh.vertices.size()) return {"a triangle without a vertex", false};
+      if (index >= mesh.vertices.size()) return {"a triangle index is out of range", false};
     }
   }
   return {"", true};
@@ -180,15 +182,16 @@ FileVerdict CheckScene(std::string_view content) {
   if (!scene.ok()) return {CheckRefusal(scene.status()), false};
   const uint32_t size = scene->size();
   if (!scene->names.empty() && scene->names.size() != size)
-    return {"names without placement", false};
+    return {"names without placements", false};
   for (uint32_t i = 0; i < size; ++i) {
     if (scene->HullOf(i) == nullptr) return {"a placement without a hull", false};
-    if (scene->PlacementOf(i).hull_id() != *scene->HullOf(i)) return {"another hull", false};
+    if (scene->PlacementOf(i).hull_id() != *scene->HullOf(i))
+      return {"a placement has a different hull", false};
   }
   const absl::StatusOr<std::vector<uint32_t>> pairs = PairsOf(*scene, kName);
   if (!pairs.ok()) return {CheckRefusal(pairs.status()), false};
   for (const uint32_t index : *pairs) {
-    if (index >= size) return {"a pair without a placement", false};
+    if (index >= size) return {"a pair index is out of range", false};
   }
   return {pairs->size() % 2 == 0 ? "" : "half a pair", true};
 }
@@ -198,9 +201,9 @@ std::string CheckRoundTrip(const google::protobuf::Message& message) {
   const std::string json = MessageJson(message);
   const std::unique_ptr<google::protobuf::Message> again(message.New());
   const absl::Status parsed = ParseJson(json, UnknownFields::kRefuse, again.get());
-  if (!parsed.ok()) return "what was written cannot be read: " + parsed.ToString() + json;
+  if (!parsed.ok()) return "the written JSON cannot be read: " + parsed.ToString() + json;
   if (again->SerializeAsString() != message.SerializeAsString()) {
-    return "what was written reads back as something else: " + json;
+    return "the written JSON does not round-trip: " + json;
   }
   return {};
 }
@@ -209,7 +212,7 @@ FileVerdict CheckJson(std::string_view content, google::protobuf::Message* messa
   const absl::Status parsed = ParseJson(std::string(content), UnknownFields::kRefuse, message);
   if (parsed.ok()) return {CheckRoundTrip(*message), true};
   const bool explained = absl::IsInvalidArgument(parsed) && !parsed.message().empty();
-  return {explained ? "" : "JSON refused without a word: " + parsed.ToString(), false};
+  return {explained ? "" : "JSON is refused without an explanation: " + parsed.ToString(), false};
 }
 
 // Reads an answer as `hullctl verify` does.
@@ -221,7 +224,8 @@ FileVerdict CheckAnswer(std::string_view content) {
   if (status.ok()) status = ParseMember(json, "response", &response);
   if (!status.ok()) {
     const bool explained = absl::IsInvalidArgument(status) && !status.message().empty();
-    return {explained ? "" : "an answer refused without a word: " + status.ToString(), false};
+    return {explained ? "" : "an answer is refused without an explanation: " + status.ToString(),
+            false};
   }
   std::string finding = CheckRoundTrip(request);
   if (finding.empty()) finding = CheckRoundTrip(response);
@@ -238,7 +242,7 @@ FileVerdict CheckUrdf(std::string_view content) {
   const auto links = static_cast<int>(robot->links.size());
   for (int i = 0; i < links; ++i) {
     const RobotLink& link = robot->links[static_cast<size_t>(i)];
-    if ((link.parent_joint < 0) != (i == 0)) return {"a root that is not the first link", false};
+    if ((link.parent_joint < 0) != (i == 0)) return {"the first link is not the only root", false};
     if (i == 0) continue;
     const RobotJoint& joint = robot->joints[static_cast<size_t>(link.parent_joint)];
     if (joint.child != i || joint.parent >= i) return {"a child before its parent", false};
@@ -247,11 +251,11 @@ FileVerdict CheckUrdf(std::string_view content) {
   const std::vector<JointValue> values = AllJointValues(*robot, RestValues(*robot));
   if (values.size() != robot->joints.size()) return {"a joint without a value", false};
   if (LinkPoses(*robot, kNoMotion, values).size() != robot->links.size()) {
-    return {"a link without a place", false};
+    return {"a link without a pose", false};
   }
   for (const LinkPair& pair : AdjacentPairs(*robot)) {
     if (pair.first < 0 || pair.first >= pair.second || pair.second >= links) {
-      return {"neighbors that are no links", false};
+      return {"an adjacent pair does not consist of links", false};
     }
   }
   return {"", true};

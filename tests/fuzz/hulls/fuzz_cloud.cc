@@ -16,7 +16,7 @@ constexpr size_t kKinds = 13;
 // Magnitudes in one program: about 1, about one power of two, or any.
 enum class Magnitudes { kTame, kCommon, kAny };
 
-// The last is rare and uses few points: it takes integers of thousands of bits.
+// The last is rare and uses few points, because it needs integers of thousands of bits.
 constexpr Magnitudes kChoices[] = {Magnitudes::kTame,   Magnitudes::kTame,   Magnitudes::kTame,
                                    Magnitudes::kTame,   Magnitudes::kCommon, Magnitudes::kCommon,
                                    Magnitudes::kCommon, Magnitudes::kAny};
@@ -156,7 +156,7 @@ class Decoder {
       Add(origin + scale * Vector(x, y, scatter.Between(-range, range)));
     }
   }
-  // All points are extreme, many coplanar in fours.
+  // All points are extreme; many groups of four are coplanar.
   void AddParaboloid() {
     Scatter scatter(in_.Byte());
     const int range = 1 + static_cast<int>(in_.Below(24));

@@ -30,7 +30,7 @@ std::string AddBlock(HullBuilder& builder, std::span<const Vector> block, size_t
     ++refused;
     const Hull before = builder.Snapshot();
     const absl::StatusOr<PointCounts> counts = builder.Add(block);
-    if (!absl::IsInvalidArgument(counts.status())) return "a point that is not finite was taken";
+    if (!absl::IsInvalidArgument(counts.status())) return "a non-finite point was accepted";
     if (!SameBits(builder.Snapshot(), before)) return "a refused block changed the hull";
   }
   const absl::StatusOr<PointCounts> counts = builder.Add(finite);
@@ -90,10 +90,10 @@ Verdict CheckHullOf(const FuzzCloud& cloud) {
   verdict.vertices = hull.vertices().size();
   verdict.finding = CheckSnapshot(hull, FiniteOf(points), verdict);
   if (verdict.finding.empty() && !SameBits(in_blocks.Snapshot(), hull)) {
-    verdict.finding = "blocks give another hull than single points";
+    verdict.finding = "blocks produce a different hull than single points";
   }
   if (verdict.finding.empty() && !SameBits(backwards.Snapshot(), hull)) {
-    verdict.finding = "the reverse order gives another hull";
+    verdict.finding = "the reverse order produces a different hull";
   }
   return verdict;
 }

@@ -90,7 +90,8 @@ TEST_F(MalformedMessage, IsNeitherAnEmptyOneNorNone) {
   }
 }
 
-// A thousandth of the size on the wire: formerly, 64 MiB were unpacked before they were counted.
+// The message is compressed to a thousandth of its size: formerly, 64 MiB were unpacked before they
+// were counted.
 TEST_F(MalformedMessage, CompressedOnesAreNotUnpacked) {
   const auto stub = v1::HullService::NewStub(channel_);
   v1::CreateHullRequest request;

@@ -134,9 +134,10 @@ std::string CheckFacets(const v1::MeshFacets& facets, uint64_t vertices) {
     if (size < 3) return "a facet has fewer than three corners";
     corners += size;
   }
-  if (corners != static_cast<uint64_t>(facets.indices_size())) return "facets tear";
+  if (corners != static_cast<uint64_t>(facets.indices_size()))
+    return "the sizes of the facets do not sum to the number of indices";
   for (const uint32_t index : facets.indices()) {
-    if (index >= vertices) return "a facet names a vertex that there is not";
+    if (index >= vertices) return "a facet names a nonexistent vertex";
   }
   return {};
 }
@@ -146,21 +147,21 @@ std::string CheckSceneTotals(const v1::SceneTotals& totals, const v1::SceneTotal
       totals.overlapping() != counted.overlapping() ||
       totals.within_tolerance() != counted.within_tolerance() ||
       totals.failed() != counted.failed() || totals.candidates() > totals.pairs()) {
-    return "the totals do not count what was found: " + totals.ShortDebugString() +
-           " but counted were " + counted.ShortDebugString();
+    return "the totals do not match the rows: " + totals.ShortDebugString() + " but counted were " +
+           counted.ShortDebugString();
   }
   return {};
 }
 
-// With a limit, rows are a part of what was found.
+// With a limit, the rows are a subset of the pairs that the totals count.
 std::string CheckLimitedTotals(uint32_t limit, const v1::SceneTotals& totals,
                                const v1::SceneTotals& counted) {
   const uint64_t answered = counted.separated() + counted.touching() + counted.overlapping();
   if (answered > limit || counted.separated() > totals.separated() ||
       counted.touching() > totals.touching() || counted.overlapping() > totals.overlapping() ||
       counted.failed() > totals.failed() || totals.candidates() > totals.pairs()) {
-    return absl::StrCat("a scene with the limit ", limit,
-                        " has more rows than it found: ", totals.ShortDebugString(),
+    return absl::StrCat("a scene with limit ", limit,
+                        " has more rows than its totals count: ", totals.ShortDebugString(),
                         " but counted were ", counted.ShortDebugString());
   }
   return {};
@@ -212,23 +213,25 @@ std::string CheckHullInfo(const v1::HullInfo& hull) {
 std::string CheckHull(const v1::GetHullRequest& request, const v1::GetHullResponse& response) {
   std::string finding = CheckHullInfo(response.hull());
   if (!finding.empty()) return finding;
-  if (response.hull().hull_id() != request.hull_id()) return "another hull than was asked for";
+  if (response.hull().hull_id() != request.hull_id()) return "the reply is about a different hull";
   const bool empty = response.hull().dimension() < 0;
   if (response.has_box_min() == empty || response.has_box_max() == empty) {
-    return "an empty hull has a box, or another has none";
+    return "an empty hull has a box, or a nonempty hull has none";
   }
-  if (response.has_audit() != request.audit()) return "an audit that was not asked for, or none";
+  if (response.has_audit() != request.audit())
+    return "an audit was returned without a request, or is missing";
   if (request.audit() && !response.audit().ok()) return "audit: " + response.audit().finding();
   return {};
 }
 
 std::string CheckPage(const v1::ListHullsRequest& request, const v1::ListHullsResponse& response) {
   const uint32_t most = request.page_size() == 0 ? 100 : std::min(request.page_size(), 1000u);
-  if (static_cast<uint32_t>(response.hulls_size()) > most) return "a page is longer than asked for";
+  if (static_cast<uint32_t>(response.hulls_size()) > most) return "a page is longer than requested";
   const std::string* before = nullptr;
   for (const v1::HullInfo& hull : response.hulls()) {
     if (before != nullptr && *before >= hull.hull_id()) return "a page is out of order";
-    if (hull.hull_id().rfind(request.prefix(), 0) != 0) return "a page strays from its prefix";
+    if (hull.hull_id().rfind(request.prefix(), 0) != 0)
+      return "a page contains an ID outside its prefix";
     before = &hull.hull_id();
     if (std::string finding = CheckHullInfo(hull); !finding.empty()) return finding;
   }
@@ -242,7 +245,8 @@ std::string CheckMesh(const v1::GetHullMeshRequest& request,
   std::string finding = CheckHullInfo(header.hull());
   if (!finding.empty()) return finding;
   if (header.has_error() != request.has_simplification() || !(header.error() >= 0)) {
-    return "the error of a simplification: " + header.ShortDebugString();
+    return "the error of a simplification is missing, unexpected, or invalid: " +
+           header.ShortDebugString();
   }
   uint64_t vertices = 0;
   uint64_t facets = 0;
@@ -258,10 +262,10 @@ std::string CheckMesh(const v1::GetHullMeshRequest& request,
     }
   }
   if (vertices != 3 * header.vertex_count() || facets != header.facet_count()) {
-    return "a mesh is not as large as its header says: " + header.ShortDebugString();
+    return "the size of a mesh does not match its header: " + header.ShortDebugString();
   }
   if (!request.has_simplification() && header.vertex_count() != header.hull().vertex_count()) {
-    return "a mesh is not its hull: " + header.ShortDebugString();
+    return "a mesh does not have the vertex count of its hull: " + header.ShortDebugString();
   }
   return {};
 }
@@ -272,11 +276,11 @@ std::string CheckPair(const v1::CheckCollisionRequest& request,
   const v1::Relation relation = response.relation();
   if (!v1::Relation_IsValid(relation) || relation == v1::RELATION_UNSPECIFIED ||
       (relation == v1::RELATION_WITHIN_TOLERANCE && !(request.tolerance() > 0))) {
-    return absl::StrCat("relation ", v1::Relation_Name(relation));
+    return absl::StrCat("unexpected relation ", v1::Relation_Name(relation));
   }
   if (response.hull_a().hull_id() != request.a().hull_id() ||
       response.hull_b().hull_id() != request.b().hull_id()) {
-    return "the answer is about other hulls";
+    return "the answer is about different hulls";
   }
   if (response.has_analysis() != wanted.analysis() ||
       response.has_separation() != wanted.separation() ||
@@ -284,7 +288,7 @@ std::string CheckPair(const v1::CheckCollisionRequest& request,
       (response.has_axis() && !wanted.axis()) || (response.has_witness() && !wanted.witness()) ||
       (response.has_normal() && !wanted.normal()) ||
       (response.has_certificate() && !wanted.certificate())) {
-    return "the answer holds something else than was wanted";
+    return "the fields of the answer do not match the wanted ones";
   }
   if (wanted.separation()) {
     std::string finding =
@@ -303,7 +307,7 @@ std::string CheckBatch(const v1::BatchCheckCollisionsRequest& request,
   for (const v1::BatchCheckCollisionsResponse& part : parts) {
     const bool first = &part == &parts.front();
     if (part.has_header() != first || part.hulls_size() != (first ? HullCount(request) : 0)) {
-      return "the table of hulls is not in the first message alone";
+      return "the table of hulls is not in the first message only";
     }
     std::string finding =
         CheckProblems(part.placement_problems(), PlacementCount(request), &problems);
@@ -387,14 +391,15 @@ void ReplaceCheck::Sent(const v1::ReplaceHullRequest& request) {
 }
 
 std::string ReplaceCheck::EndedOk(const v1::ReplaceHullResponse& response) const {
-  if (!is_whole()) return "a stream that is not whole replaced a hull";
+  if (!is_whole()) return "an incomplete stream replaced a hull";
   const v1::HullInfo& hull = response.hull();
-  if (hull.hull_id() != hull_id_) return "another hull was replaced";
-  if (hull.create_revision() != hull.revision()) return "a replacement is no new incarnation";
+  if (hull.hull_id() != hull_id_) return "a different hull was replaced";
+  if (hull.create_revision() != hull.revision()) return "a replacement is not a new incarnation";
   if (hull.counts().received() != points_) {
     return absl::StrCat("a hull of ", points_, " points has received ", hull.counts().received());
   }
-  if (response.durability() == v1::DURABILITY_UNSPECIFIED) return "a replacement's durability";
+  if (response.durability() == v1::DURABILITY_UNSPECIFIED)
+    return "a replacement without durability";
   return CheckHullInfo(hull);
 }
 
@@ -415,7 +420,7 @@ std::string AppendCheck::Received(const v1::AppendPointsResponse& response) {
     if (opened_.writer_id().empty()) return "the server chose no writer";
     return CheckHullInfo(opened_.hull());
   }
-  if (!response.has_ack()) return "`opened` comes twice";
+  if (!response.has_ack()) return "`opened` is received twice";
   const v1::AppendAck& ack = response.ack();
   const bool was_sent = std::any_of(chunks_.begin(), chunks_.end(), [&](const SentChunk& chunk) {
     return chunk.sequence == ack.sequence();
@@ -451,7 +456,7 @@ std::string AppendCheck::Ended(bool ok, bool is_certain) const {
     points += chunk.points;
   }
   if (received_ > points || (ok && is_certain && received_ < points)) {
-    return absl::StrCat("acks tell of ", received_, " points where ", points, " were new");
+    return absl::StrCat("acks report ", received_, " points, but ", points, " were new");
   }
   return {};
 }
@@ -466,7 +471,7 @@ void CollisionStreamCheck::Sent(const v1::CollisionStreamUpdate& update) {
 
 std::string CollisionStreamCheck::Received(const v1::StreamCollisionsResponse& response) {
   if (response.update() != answering_ || answering_ > sent_) return "answers are out of order";
-  if (response.has_header() != starts_) return "the header is not in the first message alone";
+  if (response.has_header() != starts_) return "the header is not in the first message only";
   const int rows = response.pairs_size();
   if (starts_) any_pair_ = false;
   for (int row = 0; row < rows; ++row) {

@@ -57,8 +57,8 @@ Codes CodesOf(Rpc rpc) {
 std::string CheckReason(Rpc rpc, const grpc::Status& status) {
   if (ReasonOf(FromGrpcStatus(status)) != v1::ERROR_REASON_UNSPECIFIED) return {};
   if (status.error_details().empty() && status.error_code() == grpc::RESOURCE_EXHAUSTED) return {};
-  return absl::StrCat(server::RpcName(rpc), " gave no reason for: \"", status.error_message(),
-                      "\"");
+  return absl::StrCat(server::RpcName(rpc), " returned no error reason for: \"",
+                      status.error_message(), "\"");
 }
 
 }  // namespace

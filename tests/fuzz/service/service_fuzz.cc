@@ -215,7 +215,7 @@ std::string ServiceFuzz::Reopen() {
     // A restored store has another ID.
     store_id_.clear();
   }
-  if (Contents() != before) return "a store is not what it was before it was opened again";
+  if (Contents() != before) return "the contents of a store differ after reopening";
   ++reached_[former.empty() ? "store opened again" : "backup opened"];
   return {};
 }
@@ -259,7 +259,7 @@ std::string ServiceFuzz::Run(std::span<const uint8_t> program) {
   if (finding.empty()) finding = run.CheckGuards();
   if (!finding.empty()) return finding;
   constexpr std::chrono::seconds kPatience(60);
-  if (!server_->WaitIdle(kPatience)) return "calls outlive the program that made them";
+  if (!server_->WaitIdle(kPatience)) return "calls outlive their program";
   finding = run.CheckAcknowledged();
   const bool due = ++programs_ % kProgramsPerOpening == 0;
   return finding.empty() && due && store_ != "memory" ? Reopen() : finding;

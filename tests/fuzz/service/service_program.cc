@@ -144,7 +144,7 @@ void ServiceProgram::Settle() {
 void ServiceProgram::SeeStore(const v1::ResponseHeader& header) {
   if (service_.store_id_.empty()) service_.store_id_ = header.store_id();
   if (header.store_id() != service_.store_id_ || header.store_id().empty()) {
-    Note("a reply names another store");
+    Note("a reply names a different store");
   }
 }
 
@@ -165,7 +165,7 @@ void ServiceProgram::SeeKnownHull(const v1::HullInfo& hull) {
   const auto known = hulls_.find(hull.hull_id());
   if (!all_doubtful_ && doubtful_.count(hull.hull_id()) == 0 &&
       (known == hulls_.end() || Known(known->second) != Known(hull))) {
-    Note(absl::StrCat("hull ", hull.hull_id(), " is ", Known(hull), "; acknowledged was ",
+    Note(absl::StrCat("hull ", hull.hull_id(), " is ", Known(hull), "; acknowledged state: ",
                       known == hulls_.end() ? "none" : Known(known->second)));
   }
   SeeHull(hull);
@@ -260,7 +260,8 @@ void ServiceProgram::ListHulls() {
     if (response.hulls_size() > 0 && response.hulls(0).hull_id() <= before) {
       Note("pages overlap");
     }
-    if (response.hulls().empty() && !response.next_page_token().empty()) Note("an empty page");
+    if (response.hulls().empty() && !response.next_page_token().empty())
+      Note("an empty page is not the last one");
     for (const v1::HullInfo& hull : response.hulls()) before = hull.hull_id();
     request.set_page_token(response.next_page_token());
   } while (!request.page_token().empty() && finding_.empty());
@@ -352,7 +353,7 @@ void ServiceProgram::ReplaceHull() {
   SeeHeader(response.header());
   const bool is_new = hulls_.count(check.hull_id()) == 0;
   if (doubtful_.count(check.hull_id()) == 0 && !all_doubtful_ && response.created() != is_new) {
-    Note("a replacement does not tell whether there was a hull");
+    Note("a replacement reports incorrectly whether a hull existed");
   }
   Reach(response.created() ? "ReplaceHull created" : "ReplaceHull replaced");
   SeeHull(response.hull());
@@ -372,7 +373,7 @@ void ServiceProgram::SaveBackup() {
       return Note("a backup: " + taken.ToString());
     }
   }
-  if (!check.complete()) Note("a backup ends OK and is not complete");
+  if (!check.complete()) Note("a backup ends OK but is incomplete");
 }
 
 void ServiceProgram::AppendPoints() {
@@ -441,7 +442,7 @@ std::vector<double> ServiceProgram::VerticesOf(const std::string& hull_id) {
     xyz.insert(xyz.end(), part.vertices().xyz().begin(), part.vertices().xyz().end());
   }
   const grpc::Status status = reader->Finish();
-  if (!status.ok()) Note("a hull that was asked about has no mesh: " + status.error_message());
+  if (!status.ok()) Note("a queried hull has no mesh: " + status.error_message());
   return xyz;
 }
 
@@ -463,8 +464,9 @@ void ServiceProgram::CheckCertificateOf(const v1::CheckCollisionRequest& asked,
   if (asked.a().has_end_pose() || asked.b().has_end_pose()) return;
   if (answer.relation() != v1::RELATION_WITHIN_TOLERANCE &&
       answer.relation() != response.relation()) {
-    return Note(absl::StrCat("two answers to one question: ", v1::Relation_Name(answer.relation()),
-                             " and ", v1::Relation_Name(response.relation())));
+    return Note(
+        absl::StrCat("two answers to the same query: ", v1::Relation_Name(answer.relation()),
+                     " and ", v1::Relation_Name(response.relation())));
   }
   const std::vector<double> a = VerticesOf(request.a().hull_id());
   const std::vector<double> b = VerticesOf(request.b().hull_id());
@@ -495,7 +497,7 @@ void ServiceProgram::BatchCheckCollisions() {
   if (!packed.has_value() || request.tolerance() != 0 || !finding_.empty()) return;
   Reach("BatchCheckCollisions compared with packed placements");
   if (AskBatch(request) != RelationsOf(parts) && finding_.empty()) {
-    Note("packed placements are answered otherwise");
+    Note("packed placements are answered differently");
   }
 }
 
@@ -506,7 +508,7 @@ std::vector<v1::Relation> ServiceProgram::AskBatch(const v1::BatchCheckCollision
   v1::BatchCheckCollisionsResponse part;
   while (reader->Read(&part)) parts.push_back(part);
   const grpc::Status status = reader->Finish();
-  if (!status.ok()) Note("a batch that another RPC has answered: " + status.error_message());
+  if (!status.ok()) Note("a batch fails that another RPC answered: " + status.error_message());
   return RelationsOf(parts);
 }
 
@@ -619,7 +621,7 @@ void ServiceProgram::SendRaw() {
   Hurry(context, manner);
   const grpc::Status status = MakeRawCall(*service_.generic_, context, call);
   if (Ended(call.rpc, manner, status) && call.malformed) {
-    Note(absl::StrCat(server::RpcName(call.rpc), " takes bytes that are no message"));
+    Note(absl::StrCat(server::RpcName(call.rpc), " accepts bytes that are not a message"));
   }
   if (call.malformed) Reach("malformed message");
   if (ChangesHulls(call.rpc)) all_doubtful_ = true;
@@ -631,7 +633,7 @@ std::string ServiceProgram::CheckAcknowledged() {
   const std::map<std::string, v1::HullInfo> hulls = service_.Hulls();
   for (const auto& [hull_id, known] : hulls_) {
     if (doubtful_.count(hull_id) == 0 && hulls.count(hull_id) == 0) {
-      Note(absl::StrCat("hull ", hull_id, " is lost; acknowledged was ", Known(known)));
+      Note(absl::StrCat("hull ", hull_id, " is lost; acknowledged state: ", Known(known)));
     }
   }
   for (const auto& [hull_id, hull] : hulls) SeeKnownHull(hull);
@@ -649,17 +651,17 @@ std::string ServiceProgram::CheckGuards() {
     context.set_deadline(std::chrono::system_clock::now() + kPatience);
     v1::CheckCollisionResponse response;
     const grpc::Status status = service_.collisions_->CheckCollision(&context, request, &response);
-    if (!status.ok()) return "the server answers no more: " + status.error_message();
+    if (!status.ok()) return "the server no longer answers: " + status.error_message();
     const v1::Relation relation = x < 1    ? v1::RELATION_OVERLAPPING
                                   : x == 1 ? v1::RELATION_TOUCHING
                                            : v1::RELATION_SEPARATED;
-    if (response.relation() != relation) return "the guards are no longer what they were";
+    if (response.relation() != relation) return "the guard hulls have changed";
     SeeHeader(response.header());
   }
   grpc::ClientContext context;
   v1::GetStatusResponse response;
   const grpc::Status status = service_.status_->GetStatus(&context, {}, &response);
-  if (!status.ok()) return "the server tells its status no more: " + status.error_message();
+  if (!status.ok()) return "the server no longer reports its status: " + status.error_message();
   SeeHeader(response.header());
   return finding_;
 }

@@ -40,7 +40,7 @@ class ServiceProgram {
 
   // Returns the first finding, or empty.
   std::string Run();
-  // Checks that the server answers, and that the hulls that no program can name are unchanged.
+  // Checks that the server answers and that the guards, which no program can name, are unchanged.
   std::string CheckGuards();
   // Checks that the existing hulls are those acknowledged, each with all acknowledged and no
   // refused changes. Requires: no call is running.
@@ -87,7 +87,8 @@ class ServiceProgram {
   void SeeKnownHull(const v1::HullInfo& hull);
   // Marks a hull with a change of unknown outcome.
   void Doubt(const std::string& hull_id) { doubtful_.insert(hull_id); }
-  // Returns `if_revision`, replaced by the revision last seen if it stands for that.
+  // Returns `if_revision`, or the acknowledged revision of the hull if `if_revision` is the
+  // revision last seen.
   uint64_t RevisionToExpect(const std::string& hull_id, uint64_t if_revision) const;
 
   // Makes a unary call. Returns true if it ended OK with a valid header.

@@ -51,7 +51,7 @@ void ServiceProgram::PutBody() {
   if (body.piece_count() != static_cast<uint64_t>(request.pieces_size()) ||
       body.revision() != response.header().revision() ||
       response.created() != (body.revision() == body.create_revision())) {
-    Note("a body that was put is another: " + body.ShortDebugString());
+    Note("a put returns a different body: " + body.ShortDebugString());
   }
   bodies_[request.body_id()] = request;
   AskAboutBody();
@@ -76,7 +76,7 @@ void ServiceProgram::GetBody() {
   const auto known = bodies_.find(request.body_id());
   if (known == bodies_.end()) return;
   if (response.pieces_size() != known->second.pieces_size()) {
-    return Note("a body has another number of pieces than were put");
+    return Note("a body has a different number of pieces than were put");
   }
   for (int i = 0; i < response.pieces_size(); ++i) {
     if (Text(response.pieces(i)) == Text(known->second.pieces(i))) continue;
@@ -186,7 +186,8 @@ void ServiceProgram::CompareWithPieces(const v1::CheckCollisionRequest& request,
   v1::Relation strongest = v1::RELATION_SEPARATED;
   for (const v1::Relation relation : AskBatch(batch)) {
     if (Strength(relation) > Strength(strongest)) strongest = relation;
-    if (relation == v1::RELATION_UNSPECIFIED) Note("a body is answered, and a piece of it is not");
+    if (relation == v1::RELATION_UNSPECIFIED)
+      Note("a body has an answer, but one of its pieces has none");
   }
   if (strongest != response.relation()) {
     return Note(absl::StrCat("a body is ", v1::Relation_Name(response.relation()),

@@ -117,7 +117,7 @@ void ServiceProgram::CompareWatched(const HullWatchCheck& check) {
   for (const auto& [hull_id, known] : hulls_) {
     const bool is_certain = doubtful_.count(hull_id) == 0 && !all_doubtful_;
     if (is_certain && check.Watches(hull_id) && check.hulls().count(hull_id) == 0) {
-      Note(absl::StrCat("hull ", hull_id, " is not told of; acknowledged was ", Known(known)));
+      Note(absl::StrCat("hull ", hull_id, " is not reported; acknowledged state: ", Known(known)));
     }
   }
   const uint64_t revision = revision_;
@@ -191,7 +191,7 @@ void ServiceProgram::WatchCollisions() {
   while (stream->Read(&response)) receive();
   const bool ok = Ended(Rpc::kWatchCollisions, manner, stream->Finish());
   if (!ok || messages == 0 || !is_followed || !finding_.empty()) return;
-  if (!check.is_settled()) return Note("a watch ends before all is told");
+  if (!check.is_settled()) return Note("a watch ends before everything is reported");
   CompareWatchWithBatch(check);
   Reach(messages > 1 ? "WatchCollisions compared after updates" : "WatchCollisions compared");
 }

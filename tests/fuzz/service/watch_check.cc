@@ -47,7 +47,7 @@ std::string HullWatchCheck::Received(const v1::WatchHullsResponse& response) {
   } else if (response.header().revision() < header_.revision()) {
     return "the revision of a watch falls";
   }
-  if (response.synced() && is_synced_) return "a watch is synced twice";
+  if (response.synced() && is_synced_) return "a watch reports `synced` twice";
   header_ = response.header();
   std::string last_id;
   uint64_t last_revision = 0;
@@ -63,9 +63,9 @@ std::string HullWatchCheck::Received(const v1::WatchHullsResponse& response) {
     }
     if (is_there) last_id = hull.hull_id();
     if (!is_there) last_revision = hull.revision();
-    if (event.is_body() && !request_.bodies()) return "a body is told of where nobody asked";
+    if (event.is_body() && !request_.bodies()) return "a body is reported without a request";
     if (event.is_body() != (event.piece_count() > 0) && IsThere(event)) {
-      return "a body without pieces, or a hull with some";
+      return "a body without pieces, or a hull with pieces";
     }
     if (event.is_body()) {
       // The ID is no longer a hull's.
@@ -89,21 +89,22 @@ std::string HullWatchCheck::TakeEvent(const v1::HullEvent& event) {
   const bool was_body = bodies_.erase(hull.hull_id()) > 0;
   const bool was_known = was_body || hulls_.count(hull.hull_id()) > 0;
   if (event.kind() == v1::HULL_EVENT_KIND_DELETED) {
-    if (!is_resumed && !was_known) return "it is gone, and was never there";
+    if (!is_resumed && !was_known) return "it is reported as deleted, but never existed";
     hulls_.erase(hull.hull_id());
     return {};
   }
   if (is_synced_ == (event.kind() == v1::HULL_EVENT_KIND_PRESENT)) {
-    return absl::StrCat("the kind of the event is ", v1::HullEventKind_Name(event.kind()));
+    return absl::StrCat("the event has the wrong kind ", v1::HullEventKind_Name(event.kind()));
   }
-  if (event.kind() == v1::HULL_EVENT_KIND_CREATED && was_known) return "it is created again";
+  if (event.kind() == v1::HULL_EVENT_KIND_CREATED && was_known)
+    return "it is reported as created twice";
   const bool changes =
       event.kind() == v1::HULL_EVENT_KIND_CHANGED || event.kind() == v1::HULL_EVENT_KIND_REPLACED;
-  if (changes && !is_resumed && !was_known) return "it changes, and was never told of";
+  if (changes && !is_resumed && !was_known) return "it changes, but was never reported";
   hulls_[hull.hull_id()] = hull;
   if (event.has_box_min() != (hull.vertex_count() > 0) ||
       event.has_box_max() != event.has_box_min()) {
-    return "its box is there without vertices, or the other way round";
+    return "it has a box without vertices, or vertices without a box";
   }
   return CheckHullInfo(hull);
 }
@@ -127,8 +128,8 @@ bool CollisionWatchCheck::IsWatched(const Pair& pair) const {
 
 std::string CollisionWatchCheck::Received(const v1::WatchCollisionsResponse& response) {
   if (response.update() < told_update_ || response.update() > sent_) {
-    return absl::StrCat("update ", response.update(), " is told of after ", told_update_, ", of ",
-                        sent_);
+    return absl::StrCat("update ", response.update(), " is reported after ", told_update_,
+                        "; updates sent: ", sent_);
   }
   if (response.header().revision() < revision_) return "the revision of a watch falls";
   revision_ = response.header().revision();
@@ -141,7 +142,7 @@ std::string CollisionWatchCheck::Received(const v1::WatchCollisionsResponse& res
   }
   for (const v1::PlacementProblem& problem : response.placement_problems()) {
     if (problem.placement() >= static_cast<uint32_t>(open_.placements_size())) {
-      return "a problem is about no placement";
+      return "a problem is not about a placement";
     }
   }
   for (const v1::CollisionEvent& event : response.events()) {
@@ -184,10 +185,10 @@ std::string CollisionWatchCheck::TakeEvent(const v1::CollisionEvent& event) {
   };
   if (has_revision(event.placement_a()) != (event.revision_a() != 0) ||
       has_revision(event.placement_b()) != (event.revision_b() != 0)) {
-    return "an event has revisions where it has no answer, or the other way round";
+    return "an event has revisions without an answer, or an answer without revisions";
   }
   if (event.has_within_clearance() != (open_.has_clearance() && !is_lost)) {
-    return "the clearance is told where nobody asked, or the other way round";
+    return "the clearance is reported without a request, or is missing";
   }
   if (!is_lost) {
     std::string finding =
@@ -203,7 +204,7 @@ std::string CollisionWatchCheck::TakeEvent(const v1::CollisionEvent& event) {
   // A pair named twice is reported twice.
   const auto named = named_.find(pair);
   if (named != named_.end() && named->second > 1) return {};
-  if (!told_now_.insert(pair).second) return "it is told of twice";
+  if (!told_now_.insert(pair).second) return "it is reported twice";
   const v1::CollisionEventKind kind =
       KindOf(before.relation, before.is_near, state.relation, state.is_near);
   if (event.kind() == kind) return {};

@@ -103,7 +103,7 @@ void Client::CheckNotFound(const Call& call) {
   if (ledger().Find(call.hull, call.since, [](const State& state) { return !state.exists; })) {
     return;
   }
-  Fail(call, "a hull is not found, and was there all the time");
+  Fail(call, "a hull is reported as not found, but it existed throughout the call");
 }
 
 void Client::CheckAborted(const Call& call) {
@@ -112,20 +112,20 @@ void Client::CheckAborted(const Call& call) {
     return state.exists ? state.record.revision != *call.if_revision : *call.if_revision != 0;
   };
   if (call.if_revision.has_value() && ledger().Find(call.hull, call.since, differs)) return;
-  Fail(call, "a condition is said to have failed, and held all the time");
+  Fail(call, "a condition is reported as failed, but it was met throughout the call");
 }
 
 void Client::Claim(const Call& call, std::optional<size_t> state, const std::string& what) {
-  if (!state.has_value()) Fail(call, absl::StrCat(what, ", and the store keeps no such change"));
+  if (!state.has_value()) Fail(call, absl::StrCat(what, ", but the store has no such change"));
   if (!ledger().Claim(call.hull, *state)) {
-    Fail(call, absl::StrCat(what, ", and another call made that change"));
+    Fail(call, absl::StrCat(what, ", but another call made that change"));
   }
   ledger().Report(call.hull, *state);
   if (!call.if_revision.has_value()) return;
   const State& before = ledger().At(call.hull, *state - 1);
   if (*call.if_revision != (before.exists ? before.record.revision : 0)) {
     Fail(call,
-         absl::StrCat(what, " under the condition ", *call.if_revision, ", which did not hold"));
+         absl::StrCat(what, " under the condition ", *call.if_revision, ", which was not met"));
   }
 }
 
@@ -140,14 +140,14 @@ void Client::Create() {
                              ledger().Find(call.hull, call.since, exists);
       if (MayBeOther(call, result.status(), true)) return;
       if (may_exist || MayFail(call, result.status(), false)) return;
-      Fail(call, absl::StrCat("wrong: ", result.status().ToString()));
+      Fail(call, absl::StrCat("unexpected error: ", result.status().ToString()));
     }
     const auto is_it = [&](const State& state) {
       return state.exists && state.record == result->hull;
     };
     const auto state = ledger().Find(call.hull, call.since, is_it);
     if (result->created) return Claim(call, state, absl::StrCat("created ", Text(result->hull)));
-    if (!state.has_value()) Fail(call, absl::StrCat("there is no ", Text(result->hull)));
+    if (!state.has_value()) Fail(call, absl::StrCat("no state matches ", Text(result->hull)));
     ledger().Report(call.hull, *state);
   };
   Await<PutHullResult>(
@@ -166,7 +166,7 @@ void Client::Delete() {
     if (absl::IsAborted(result.status())) return CheckAborted(call);
     if (!result.ok()) {
       if (MayFail(call, result.status(), false)) return;
-      Fail(call, absl::StrCat("wrong: ", result.status().ToString()));
+      Fail(call, absl::StrCat("unexpected error: ", result.status().ToString()));
     }
     const auto is_it = [&](const State& state) {
       return !state.exists && state.revision == *result;
@@ -198,7 +198,7 @@ void Client::Replace() {
     if (creates && MayBeOther(call, result.status(), true)) return;
     if (!result.ok()) {
       if (MayFail(call, result.status(), false)) return;
-      Fail(call, absl::StrCat("wrong: ", result.status().ToString()));
+      Fail(call, absl::StrCat("unexpected error: ", result.status().ToString()));
     }
     const auto is_it = [&](const State& state) {
       return state.exists && state.record == result->hull && state.points == points;
@@ -206,7 +206,7 @@ void Client::Replace() {
     const auto state = ledger().Find(call.hull, call.since, is_it);
     Claim(call, state, absl::StrCat("replaced by ", Text(result->hull)));
     if (result->created == ledger().At(call.hull, *state - 1).exists) {
-      Fail(call, "a replacement says the wrong of whether there was a hull");
+      Fail(call, "a replacement reports incorrectly whether a hull existed");
     }
   };
   Await<PutHullResult>(
@@ -221,12 +221,12 @@ void Client::List() {
   Scheduler::Current().Note("lists hulls");
   if (const absl::Status fresh = simulation_.registry.barrier().AwaitPeers({}); !fresh.ok()) {
     if (MayFail(call, fresh, false)) return;
-    Fail(call, absl::StrCat("wrong: ", fresh.ToString()));
+    Fail(call, absl::StrCat("unexpected error: ", fresh.ToString()));
   }
   const absl::StatusOr<RecordPage> listed_page = simulation_.registry.List("", "", kHulls);
   if (!listed_page.ok()) {
     if (MayFail(call, listed_page.status(), false)) return;
-    Fail(call, absl::StrCat("wrong: ", listed_page.status().ToString()));
+    Fail(call, absl::StrCat("unexpected error: ", listed_page.status().ToString()));
   }
   const RecordPage& page = *listed_page;
   for (call.hull = 0; call.hull < kHulls; ++call.hull) {
@@ -253,7 +253,7 @@ bool Client::AwaitFresh(const Freshness& freshness) {
   const auto fresh = std::make_shared<absl::Status>();
   const bool asks =
       simulation_.registry.barrier().StartFresh(freshness, [=](const absl::Status& status) {
-        if (told->is_set()) Scheduler::Current().Fail("a reader is told twice");
+        if (told->is_set()) Scheduler::Current().Fail("a reader is notified twice");
         *fresh = status;
         told->Set();
       });
@@ -291,7 +291,7 @@ void Client::Read() {
   ++simulation_.reached.answers;
   if (!resolved.ok()) {
     if (MayFail(call, resolved.status(), true)) return;
-    Fail(call, absl::StrCat("wrong: ", resolved.status().ToString()));
+    Fail(call, absl::StrCat("unexpected error: ", resolved.status().ToString()));
   }
   for (size_t i = 0; i < ids.size(); ++i) {
     call.hull = static_cast<size_t>(ids[i][0] - 'a');
@@ -304,19 +304,19 @@ void Client::Read() {
 
 void Client::CheckView(const Call& call, uint64_t revision, const absl::StatusOr<HullView>& view) {
   if (revision < call.since.revision || revision > ledger().revision()) {
-    Fail(call, absl::StrCat("an answer is of revision ", revision));
+    Fail(call, absl::StrCat("an answer has revision ", revision));
   }
   const bool is_there = view.ok();
   if (!is_there && !absl::IsNotFound(view.status())) {
     if (MayFail(call, view.status(), true)) return;
-    Fail(call, absl::StrCat("wrong: ", view.status().ToString()));
+    Fail(call, absl::StrCat("unexpected error: ", view.status().ToString()));
   }
   const auto is_it = [&](const State& state) {
     return state.exists == is_there && (!is_there || state.record == view->record);
   };
   const auto state = ledger().FindAt(call.hull, call.since, revision, is_it);
   if (!state.has_value()) {
-    Fail(call, absl::StrCat("at revision ", revision, " a reader is given ",
+    Fail(call, absl::StrCat("at revision ", revision, " a reader receives ",
                             is_there ? Text(view->record) : "no hull"));
   }
   ledger().Report(call.hull, *state);
@@ -327,7 +327,8 @@ void Client::CheckView(const Call& call, uint64_t revision, const absl::StatusOr
 // The points are those of the record, regardless of later changes.
 void Client::CheckServed(const Call& call, const State& state, const HullView& view) {
   const ServedHull& served = *view.served;
-  if (served.empty() != (state.points == 0)) Fail(call, "a reader is given points, or none");
+  if (served.empty() != (state.points == 0))
+    Fail(call, "a reader receives points of an empty hull, or none of a nonempty hull");
   if (served.empty()) return;
   const QueryHull& version = served.query_hull();
   CurveSet points = 0;
@@ -336,40 +337,40 @@ void Client::CheckServed(const Call& call, const State& state, const HullView& v
     is_right = AddPoint(version.point(i), points) && is_right;
   }
   if (!is_right || points != state.points) {
-    Fail(call, absl::StrCat("a reader is given points ", absl::Hex(points), " for ",
+    Fail(call, absl::StrCat("a reader receives points ", absl::Hex(points), " for ",
                             Ledger::Describe(state)));
   }
   const std::vector<Vector> expected = PointsOf(points);
   if (served.low() != expected.front() || served.high() != expected.back()) {
-    Fail(call, "the box that a reader is given is not that of the points");
+    Fail(call, "a reader receives a box that does not match the points");
   }
 }
 
 void Client::MakeCanonical(const Call& before, const HullView& view) {
   Call call = Begin(before.hull);
   const std::function<bool()> stop = StopOf(call);
-  Scheduler::Current().Note("makes a snapshot of hull", call.hull, view.record.revision);
+  Scheduler::Current().Note("creates a snapshot of hull", call.hull, view.record.revision);
   const absl::StatusOr<const Hull*> made = simulation_.registry.reader().Canonical(view, stop);
   if (!made.ok()) {
     if (MayFail(call, made.status(), true)) return;
-    Fail(call, absl::StrCat("wrong: ", made.status().ToString()));
+    Fail(call, absl::StrCat("unexpected error: ", made.status().ToString()));
   }
   const std::optional<CurveSet> points = SetOf((*made)->vertices());
   const bool is_right =
       points.has_value() && (*made)->vertices().size() == view.record.vertex_count;
-  if (!is_right) Fail(call, "a snapshot has other vertices than its record says");
+  if (!is_right) Fail(call, "the vertices of a snapshot do not match its record");
   ++simulation_.reached.snapshots;
 }
 
 // Evicts everything unused; calls that need more memory concurrently are refused.
 void Client::Press() {
   const bool reads = random().OneIn(2);
-  Scheduler::Current().Note("presses on memory");
+  Scheduler::Current().Note("fills the memory");
   const MemoryCharge charge(simulation_.registry.memory(),
                             reads ? MemoryUse::kReading : MemoryUse::kWriting,
                             simulation_.plan.memory_limit + 1);
   simulation_.registry.CheckMemory(reads ? MemoryUse::kWriting : MemoryUse::kReading).IgnoreError();
-  Scheduler::Current().Note("lets go of memory");
+  Scheduler::Current().Note("releases the memory");
 }
 
 void Client::CheckAll() {
@@ -382,7 +383,7 @@ void Client::CheckAll() {
     if (resolved.ok()) {
       CheckView(call, resolved->as_of.revision, resolved->hulls[0]);
     } else if (!MayFail(call, resolved.status(), false)) {
-      Fail(call, absl::StrCat("wrong: ", resolved.status().ToString()));
+      Fail(call, absl::StrCat("unexpected error: ", resolved.status().ToString()));
     }
     CheckSequences(hull);
   }

@@ -15,7 +15,7 @@
 
 namespace hulld::server {
 
-// Calls the registry at random, and ends the schedule at an answer that the ledger does not
+// Makes random calls to the registry, and ends the schedule at an answer that the ledger does not
 // explain.
 class Client {
  public:

@@ -60,24 +60,26 @@ void Client::PutBody() {
         return !state.exists && *call.if_revision != (state.is_body ? state.record.revision : 0);
       };
       if (call.if_revision.has_value() && ledger().Find(call.hull, call.since, differs)) return;
-      Fail(call, "a condition on a body is said to have failed, and held all the time");
+      Fail(call, "a condition on a body is reported as failed, but it was met throughout the call");
     }
     if (!result.ok()) {
       if (MayBeOther(call, result.status(), false)) return;
       if (MayFail(call, result.status(), false)) return;
-      Fail(call, absl::StrCat("wrong: ", result.status().ToString()));
+      Fail(call, absl::StrCat("unexpected error: ", result.status().ToString()));
     }
     const auto state = ledger().Find(call.hull, call.since,
                                      [&](const State& one) { return IsOf(one, result->body); });
     const std::string what = absl::StrCat("put a body at ", result->body.revision);
-    if (!state.has_value()) Fail(call, absl::StrCat(what, ", and the store keeps none"));
-    if (!ledger().Claim(call.hull, *state)) Fail(call, absl::StrCat(what, ", as another call did"));
+    if (!state.has_value()) Fail(call, absl::StrCat(what, ", but the store has no such body"));
+    if (!ledger().Claim(call.hull, *state))
+      Fail(call, absl::StrCat(what, ", but another call made that change"));
     ledger().Report(call.hull, *state);
     const State& before = ledger().At(call.hull, *state - 1);
-    if (result->created == before.is_body) Fail(call, "it is said wrongly that there was none");
+    if (result->created == before.is_body)
+      Fail(call, "a put reports incorrectly whether a body existed");
     const uint64_t revision = before.is_body ? before.record.revision : 0;
     if (call.if_revision.value_or(revision) != revision) {
-      Fail(call, absl::StrCat(what, " under a condition that did not hold"));
+      Fail(call, absl::StrCat(what, " under a condition that was not met"));
     }
     ++simulation_.reached.bodies_put;
   };
@@ -95,7 +97,7 @@ void Client::DeleteBody() {
     if (absl::IsNotFound(result.status())) return CheckBody(call, std::nullopt, std::nullopt);
     if (!result.ok()) {
       if (MayFail(call, result.status(), false)) return;
-      Fail(call, absl::StrCat("wrong: ", result.status().ToString()));
+      Fail(call, absl::StrCat("unexpected error: ", result.status().ToString()));
     }
     const auto is_it = [&](const State& state) {
       return !state.exists && !state.is_body && state.revision == *result;
@@ -121,7 +123,7 @@ void Client::CheckBody(const Call& call, std::optional<uint64_t> revision,
   const auto state = revision.has_value() ? ledger().FindAt(call.hull, call.since, *revision, is_it)
                                           : ledger().Find(call.hull, call.since, is_it);
   if (!state.has_value()) {
-    Fail(call, absl::StrCat("a call is given ",
+    Fail(call, absl::StrCat("a call receives ",
                             !body.has_value() ? "no body"
                                               : absl::StrCat("a body at ", body->record.revision),
                             " at revision ", revision.value_or(0)));
@@ -137,7 +139,7 @@ void Client::FindBodies() {
   Scheduler::Current().Note("looks for bodies", ids.size());
   if (const absl::Status fresh = simulation_.registry.barrier().AwaitPeers({}); !fresh.ok()) {
     if (MayFail(call, fresh, false)) return;
-    Fail(call, absl::StrCat("wrong: ", fresh.ToString()));
+    Fail(call, absl::StrCat("unexpected error: ", fresh.ToString()));
   }
   FoundBodies found;
   if (random().OneIn(3)) {
@@ -150,7 +152,7 @@ void Client::FindBodies() {
   ++simulation_.reached.answers;
   if (!found.status.ok()) {
     if (MayFail(call, found.status, true)) return;
-    Fail(call, absl::StrCat("wrong: ", found.status.ToString()));
+    Fail(call, absl::StrCat("unexpected error: ", found.status.ToString()));
   }
   for (call.hull = 0; call.hull < ids.size(); ++call.hull) {
     const bool is_last = call.hull + 1 == ids.size();
@@ -166,14 +168,14 @@ void Client::ListBodies() {
   Scheduler::Current().Note("lists bodies");
   if (const absl::Status fresh = simulation_.registry.barrier().AwaitPeers({}); !fresh.ok()) {
     if (MayFail(call, fresh, false)) return;
-    Fail(call, absl::StrCat("wrong: ", fresh.ToString()));
+    Fail(call, absl::StrCat("unexpected error: ", fresh.ToString()));
   }
   const absl::StatusOr<RecordPage> page =
       simulation_.registry.List("", "", kHulls, {}, {.bodies = true});
   ++simulation_.reached.answers;
   if (!page.ok()) {
     if (MayFail(call, page.status(), false)) return;
-    Fail(call, absl::StrCat("wrong: ", page.status().ToString()));
+    Fail(call, absl::StrCat("unexpected error: ", page.status().ToString()));
   }
   for (call.hull = 0; call.hull < kHulls; ++call.hull) {
     const auto listed = std::ranges::find_if(page->entries, [&](const HullChange& body) {

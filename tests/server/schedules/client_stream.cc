@@ -63,14 +63,14 @@ bool Client::OpenStream(const std::shared_ptr<Stream>& stream, bool create_if_ab
   Scheduler::Current().Note("opens a stream into hull", stream->hull, stream->writer,
                             create_if_absent ? 1 : 0);
   const auto on_gone = [this, stream, call](const absl::Status&) {
-    if (std::exchange(stream->is_gone, true)) Fail(call, "a stream is told twice that it is over");
+    if (std::exchange(stream->is_gone, true)) Fail(call, "a stream is notified twice of its end");
   };
   const auto check = [&](const absl::StatusOr<OpenResult>& result) {
     if (result.ok()) return CheckOpened(call, *stream, *result);
     if (absl::IsNotFound(result.status()) && !create_if_absent) return CheckNotFound(call);
     if (create_if_absent && MayBeOther(call, result.status(), true)) return;
     if (MayFail(call, result.status(), false)) return;
-    Fail(call, absl::StrCat("wrong: ", result.status().ToString()));
+    Fail(call, absl::StrCat("unexpected error: ", result.status().ToString()));
   };
   Await<OpenResult>(
       [&](Reply<OpenResult> done) {
@@ -95,7 +95,7 @@ void Client::CheckOpened(const Call& call, Stream& stream, const OpenResult& res
     return Claim(call, state, absl::StrCat("created at ", stream.incarnation));
   }
   if (!state.has_value()) {
-    Fail(call, absl::StrCat("a stream is told that the last sequence of writer ",
+    Fail(call, absl::StrCat("no state matches the answer to a stream: the last sequence of writer ",
                             WriterName(stream.writer), " is ", result.last_sequence,
                             " at revision ", result.hull.revision));
   }
@@ -137,7 +137,8 @@ void Client::CheckChunk(const Call& call, const Stream& stream, uint64_t sequenc
   };
   const auto state = ledger().Find(call.hull, call.since, has_it);
   if (!state.has_value()) {
-    Fail(call, absl::StrCat("chunk ", sequence, " is said to be applied already at revision ",
+    Fail(call, absl::StrCat("chunk ", sequence,
+                            " is incorrectly reported as already applied at revision ",
                             result->hull_revision));
   }
   ledger().Report(call.hull, *state);
@@ -163,7 +164,7 @@ void Client::CheckApplied(const Call& before, const Stream& stream, uint64_t seq
   if (result.hull_revision != after.record.revision || result.counts != counts ||
       result.vertex_count != after.record.vertex_count ||
       result.store_revision < after.record.revision) {
-    Fail(call, absl::StrCat("chunk ", sequence, " is answered with other numbers than are true"));
+    Fail(call, absl::StrCat("chunk ", sequence, " is answered with incorrect numbers"));
   }
 }
 
@@ -194,7 +195,7 @@ void Client::CheckRefused(const Call& call, const Stream& stream, const absl::St
     default:
       if (MayFail(call, status, true)) return;
   }
-  Fail(call, absl::StrCat("wrong: ", status.ToString()));
+  Fail(call, absl::StrCat("unexpected error: ", status.ToString()));
 }
 
 // A gap follows a chunk refused for another reason. Answers may arrive out of order.
@@ -203,9 +204,9 @@ void Client::CheckOrder(const Stream& stream) {
       std::ranges::find_if(stream.sent, [](const auto& sent) { return !sent->status.ok(); });
   if (refused == stream.sent.end()) return;
   if (ReasonOf((*refused)->status) != v1::ERROR_REASON_SEQUENCE_GAP) return;
-  Scheduler::Current().Fail(
-      absl::StrCat("nothing was refused before: ", (*refused)->status.ToString(), "\n",
-                   ledger().Describe(stream.hull)));
+  Scheduler::Current().Fail(absl::StrCat(
+      "a gap is reported, but no earlier chunk was refused: ", (*refused)->status.ToString(), "\n",
+      ledger().Describe(stream.hull)));
 }
 
 void Client::CheckSequences(size_t hull) {

@@ -90,7 +90,7 @@ void CollisionWatcher::CheckSent(const HullRecord& hull) const {
   const Version used = {hull.create_revision, hull.revision};
   if (sent != sent_.end() && sent->second == used) return;
   Scheduler::Current().Fail(absl::StrCat("a collision watch uses \"", hull.hull_id, "\" at ",
-                                         Text(used), ", and its client received ",
+                                         Text(used), ", but its client received ",
                                          sent == sent_.end() ? "no version" : Text(sent->second)));
 }
 

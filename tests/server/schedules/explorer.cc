@@ -15,7 +15,7 @@ uint64_t running_seed = 0;
 const Scheduler* running = nullptr;
 
 std::string Heading(uint64_t seed, const std::string& what) {
-  return absl::StrCat("seed ", seed, " (again: HULLD_TEST_SEED=", seed,
+  return absl::StrCat("seed ", seed, " (to reproduce: HULLD_TEST_SEED=", seed,
                       " HULLD_SCHEDULES=1): ", what, "\n");
 }
 
@@ -24,7 +24,7 @@ std::string Heading(uint64_t seed, const std::string& what) {
 void ReportAbort(int) {
   if (running == nullptr) return;
   const std::string text =
-      Heading(running_seed, "an invariant is broken; the steps:") + running->Steps();
+      Heading(running_seed, "an invariant is violated; steps:") + running->Steps();
   std::fputs(text.c_str(), stderr);
 }
 
@@ -46,7 +46,7 @@ const char* NameOf(ScheduleFault::Kind kind) {
     case ScheduleFault::Kind::kLivelock:
       return "no end";
     case ScheduleFault::Kind::kWrongAnswer:
-      return "against the specification";
+      return "a violation of the specification";
   }
   return "";
 }

@@ -65,8 +65,8 @@ std::optional<std::string> Ledger::Keep(const Change& change, bool nobody_waits)
   const bool is_new = state.revision != Last(hull).revision;
   if (fault.empty() && is_new && state.revision <= revision_) fault = "its revision is not new";
   if (!fault.empty()) {
-    return absl::StrCat("the store was given a wrong change of hull ", change.id(), " at revision ",
-                        change.revision, ": ", fault, "\n", Describe(hull));
+    return absl::StrCat("the store received an incorrect change of hull ", change.id(),
+                        " at revision ", change.revision, ": ", fault, "\n", Describe(hull));
   }
   revision_ = std::max(revision_, state.revision);
   states_[hull].push_back(std::move(state));
@@ -75,7 +75,8 @@ std::optional<std::string> Ledger::Keep(const Change& change, bool nobody_waits)
 
 std::string Ledger::KeepEnd(const Change& change, State& state) {
   if (!state.exists) return "there is nothing to delete";
-  if (change.hull.record != state.record) return "it deletes another hull than there is";
+  if (change.hull.record != state.record)
+    return "it deletes a different hull than the existing one";
   state =
       State{.record = state.record, .revision = change.revision, .is_claimed = state.is_claimed};
   return {};
@@ -84,15 +85,17 @@ std::string Ledger::KeepEnd(const Change& change, State& state) {
 // Records a creation, or a replacement with or without an existing hull.
 std::string Ledger::KeepBeginning(const Change& change, State& state) {
   const HullRecord& record = change.hull.record;
-  if (state.is_body) return "the ID is a body's";
-  if (change.replaced.has_value() != state.exists) return "there is, or is not, a hull already";
-  if (state.exists && change.replaced->record != state.record) return "it replaces another hull";
+  if (state.is_body) return "the ID belongs to a body";
+  if (change.replaced.has_value() != state.exists)
+    return "it replaces a hull that does not exist, or creates one that exists";
+  if (state.exists && change.replaced->record != state.record)
+    return "it replaces a different hull than the existing one";
   const std::optional<CurveSet> points = SetOf(change.vertices);
-  if (!points.has_value()) return "its vertices are none that were sent";
+  if (!points.has_value()) return "its vertices are not among those sent";
   if (record.create_revision != change.revision || record.revision != change.revision) {
-    return "its record is of another revision";
+    return "its record has a different revision";
   }
-  if (!HasSize(record, *points)) return "its record has another number of vertices";
+  if (!HasSize(record, *points)) return "its record has an incorrect number of vertices";
   state = State{.exists = true,
                 .record = record,
                 .revision = change.revision,
@@ -104,15 +107,15 @@ std::string Ledger::KeepBeginning(const Change& change, State& state) {
 // Records a put or a deletion.
 std::string Ledger::KeepBody(const Change& change, State& state) {
   const BodyRecord& record = change.body->record;
-  if (state.exists) return "the ID is a hull's";
+  if (state.exists) return "the ID belongs to a hull";
   if (change.deleted && !state.is_body) return "there is no body to delete";
   const bool is_it = record.create_revision == state.record.create_revision &&
                      record.revision == state.record.revision;
-  if (change.deleted && !is_it) return "it deletes another body than there is";
+  if (change.deleted && !is_it) return "it deletes a different body than the existing one";
   if (!change.deleted) {
     const uint64_t created = state.is_body ? state.record.create_revision : change.revision;
-    if (record.create_revision != created) return "the body has another beginning";
-    if (record.revision != change.revision) return "its record is of another revision";
+    if (record.create_revision != created) return "the body has a different create_revision";
+    if (record.revision != change.revision) return "its record has a different revision";
   }
   HullRecord now;
   now.hull_id = record.body_id;
@@ -128,7 +131,7 @@ std::string Ledger::KeepBody(const Change& change, State& state) {
 std::string Ledger::KeepChunk(const Change& change, State& state) {
   const HullRecord& record = change.hull.record;
   if (!state.exists) return "there is no hull for the chunk";
-  if (record.create_revision != state.record.create_revision) return "the hull is another by now";
+  if (record.create_revision != state.record.create_revision) return "the hull has been replaced";
   uint64_t& last = state.sequences[WriterOf(change.writer->writer_id)];
   if (change.writer->sequence != last + 1) {
     return absl::StrCat("chunk ", change.writer->sequence, " of writer ", change.writer->writer_id,
@@ -142,21 +145,21 @@ std::string Ledger::KeepChunk(const Change& change, State& state) {
   counts.received += CountOf(sent);
   counts.outside += CountOf(added);
   counts.duplicate += CountOf(sent) - CountOf(added);
-  if (record.counts != counts) return "its record counts other points";
-  if (!HasSize(record, state.points)) return "its record has another number of vertices";
+  if (record.counts != counts) return "its record has incorrect point counts";
+  if (!HasSize(record, state.points)) return "its record has an incorrect number of vertices";
   switch (change.vertex_change) {
     case VertexChange::kNone:
-      if (added != 0) return "it keeps no vertices of those that came";
+      if (added != 0) return "it contains none of the new vertices";
       break;
     case VertexChange::kAdded:
-      if (!HasVertices(change, added)) return "it adds other vertices than came";
+      if (!HasVertices(change, added)) return "it adds different vertices than those sent";
       break;
     case VertexChange::kReplaced:
-      if (!HasVertices(change, state.points)) return "its base is not the hull";
+      if (!HasVertices(change, state.points)) return "its vertices are not those of the hull";
       break;
   }
   const uint64_t revision = added == 0 ? state.record.revision : change.revision;
-  if (record.revision != revision) return "its record is of another revision";
+  if (record.revision != revision) return "its record has a different revision";
   state.revision = revision;
   state.record = record;
   return {};
@@ -188,7 +191,7 @@ std::optional<std::string> Ledger::Unclaimed() const {
   for (size_t hull = 0; hull < kHulls; ++hull) {
     for (const State& state : states_[hull]) {
       if (state.is_claimed) continue;
-      return absl::StrCat("the store keeps a change of hull ", HullName(hull),
+      return absl::StrCat("the store has a change of hull ", HullName(hull),
                           " whose call was refused: ", Describe(state), "\n", Describe(hull));
     }
   }
@@ -207,7 +210,7 @@ std::string Ledger::Describe(const State& state) {
 }
 
 std::string Ledger::Describe(size_t hull) const {
-  std::string text = absl::StrCat("hull ", HullName(hull), " was kept as:");
+  std::string text = absl::StrCat("hull ", HullName(hull), " has the stored states:");
   for (const State& state : states_[hull]) absl::StrAppend(&text, "\n  ", Describe(state));
   return text;
 }

@@ -26,9 +26,9 @@ std::string WriterName(size_t writer);
 // of times.
 CurveSet ChunkPoints(size_t writer, uint64_t sequence);
 
-// The specification: everything that the store kept, as states of sequential hulls. The store
-// determines when a change takes effect. An answer is correct if a state between the call and its
-// answer explains it, and that state is no older than any state reported before.
+// The specification: all changes that the store accepted, as states of sequential hulls. The store
+// determines when a change takes effect. An answer is correct if a state between the call and the
+// answer explains it, and no newer state was reported before the call.
 class Ledger {
  public:
   // A hull after a change of it.
@@ -54,8 +54,8 @@ class Ledger {
 
   Ledger();
 
-  // Records a change that the store keeps. Returns its fault, if any. nobody_waits: the call that
-  // made it will not be answered.
+  // Records a change that the store accepted. Returns its fault, if any. nobody_waits: the call
+  // that made the change will not be answered.
   std::optional<std::string> Keep(const Change& change, bool nobody_waits);
 
   // Revision of the store at the last change.
@@ -87,9 +87,9 @@ class Ledger {
   void Report(size_t hull, size_t index);
   void ReportRevision(uint64_t revision);
   // Records that a call was acknowledged to have made this change. Returns false if another call
-  // was before.
+  // already was.
   bool Claim(size_t hull, size_t index);
-  // Returns a change that the store kept but no call was acknowledged to have made.
+  // Returns a change that the store accepted but that no call was acknowledged to have made.
   std::optional<std::string> Unclaimed() const;
 
   static std::string Describe(const State& state);

@@ -115,11 +115,11 @@ void Scheduler::Fail(std::string what) {
 
 void Scheduler::Suspend() { threads_[running_].fiber->Suspend(); }
 
-// Switches to another thread if it is that one's turn, and returns when it is this one's.
+// Switches to the thread whose turn is next, and returns when it is the turn of this thread.
 void Scheduler::GoOn() {
   if (steps_.size() > kMostSteps) {
     fault_ = {ScheduleFault::Kind::kLivelock,
-              absl::StrCat("it did not end within ", kMostSteps, " steps")};
+              absl::StrCat("the schedule did not end within ", kMostSteps, " steps")};
     while (true) Suspend();
   }
   ++now_;
@@ -172,7 +172,7 @@ void Scheduler::MayWakeOne() {
   thread.was_notified = !by_time;
   if (by_time) now_ = std::max(now_, thread.deadline);
   steps_.push_back({woken,
-                    by_time ? "is woken by its time limit" : "is woken for no reason",
+                    by_time ? "is woken by its time limit" : "is woken spuriously",
                     thread.object,
                     {},
                     thread.where,
@@ -260,7 +260,7 @@ std::string Scheduler::NameOf(size_t thread) const {
 }
 
 ScheduleFault Scheduler::Stuck() const {
-  ScheduleFault fault{ScheduleFault::Kind::kDeadlock, "no thread can go on:"};
+  ScheduleFault fault{ScheduleFault::Kind::kDeadlock, "no thread can proceed:"};
   for (size_t i = 0; i < threads_.size(); ++i) {
     const ThreadState& thread = threads_[i];
     if (thread.status == Status::kDone) continue;
@@ -268,7 +268,7 @@ ScheduleFault Scheduler::Stuck() const {
     if (thread.where.line() > 0) absl::StrAppend(&fault.what, ", ", LineOf(thread.where));
     if (thread.status != Status::kWaiting) continue;
     if (thread.condition.holds != nullptr && thread.condition.holds(thread.condition.context)) {
-      absl::StrAppend(&fault.what, ": it holds, and nobody woke the thread");
+      absl::StrAppend(&fault.what, ": the condition is true, but no notification woke the thread");
       fault.kind = ScheduleFault::Kind::kLostWakeup;
     } else if (thread.deadline != kNoDeadline) {
       absl::StrAppend(&fault.what, ", for a limited time");

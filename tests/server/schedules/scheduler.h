@@ -19,8 +19,8 @@ struct ScheduleFault {
   enum class Kind {
     // Threads wait, and none can run.
     kDeadlock,
-    // As kDeadlock, but the condition of a waiting thread holds: its notification is missing. A
-    // wait with a time limit counts as well.
+    // As kDeadlock, but the condition of a waiting thread is true: its notification is missing. A
+    // wait with a time limit also counts.
     kLostWakeup,
     // The schedule does not terminate.
     kLivelock,
@@ -32,7 +32,7 @@ struct ScheduleFault {
 };
 
 // Runs threads of a test as fibers, one after another. A seed decides which runs next whenever a
-// thread takes a mutex, waits, notifies, or calls the store: the same seed gives the same steps.
+// thread takes a mutex, waits, notifies, or calls the store; the same seed produces the same steps.
 // Code between two such points is atomic for other threads, so data races are left to
 // ThreadSanitizer.
 //
@@ -100,7 +100,7 @@ class Scheduler {
   // Waits for a notification or the deadline. Returns true if notified.
   bool Wait(const void* object, int64_t deadline, const Condition& condition,
             const Location& where);
-  // Waits for notifications until the condition holds.
+  // Waits for notifications until the condition is true.
   void WaitUntil(const void* object, const Condition& condition,
                  const Location& where = Location::current());
   void Notify(const void* object, bool all = true, const Location& where = Location::current());

@@ -128,7 +128,7 @@ void Count(bool takes_mutex) {
     });
   }
   Join(threads);
-  if (count != 3) Scheduler::Current().Fail("it counts wrong");
+  if (count != 3) Scheduler::Current().Fail("the count is incorrect");
 }
 
 TEST(Scheduler, FindsInterleavedSteps) {
@@ -142,7 +142,7 @@ TEST(Scheduler, FindsNothingWhereMutexesAreHeld) {
   EXPECT_FALSE(fault.has_value()) << fault->what;
 }
 
-// A chain of hand-overs; a notification before the wait must not break any.
+// A chain of handovers. A notification before the wait must not break any of them.
 TEST(Scheduler, FindsNothingWhereConditionsAreUsedRightly) {
   const auto fault = Find([] {
     constexpr int kThreads = 4;

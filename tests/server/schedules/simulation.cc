@@ -19,8 +19,8 @@ constexpr uint64_t kPlentyOfMemory = uint64_t{1} << 30;
 // Upper bound for a body of one piece.
 constexpr uint64_t kMostBytesOfBody = 512;
 
-// Checks the statistics of an idle registry: it holds the contents of the store, can evict all of
-// it, and then counts nothing.
+// Checks the statistics of an idle registry: it has the contents of the store, can evict all of
+// them, and then counts nothing.
 void CheckAtRest(const Simulation& simulation) {
   Scheduler& scheduler = Scheduler::Current();
   const Ledger& ledger = simulation.ledger();
@@ -40,12 +40,12 @@ void CheckAtRest(const Simulation& simulation) {
     scheduler.Fail(absl::StrCat("the registry counts ", sizes.hull_count, " hulls of ",
                                 sizes.vertex_count, " vertices and ", sizes.body_count,
                                 " bodies at revision ", sizes.store_revision,
-                                ", and the store keeps ", hulls, " of ", vertices, " and ", bodies,
+                                ", but the store has ", hulls, " of ", vertices, " and ", bodies,
                                 " at ", ledger.revision()));
   }
   if (auto fault = ledger.Unclaimed()) scheduler.Fail(*fault);
   if (registry.Cache().damaged > 0 && !simulation.store.has_damage()) {
-    scheduler.Fail("a hull is taken for damaged, and none is");
+    scheduler.Fail("a hull is reported as damaged, but none is");
   }
   {
     const MemoryCharge charge(registry.memory(), MemoryUse::kReading,
@@ -58,9 +58,9 @@ void CheckAtRest(const Simulation& simulation) {
   // puts kMostCalls at most.
   if (simulation.plan.bodies > 0) bodies += simulation.plan.clients * Client::kMostCalls;
   if (simulation.plan.preparations > 0 || cache.bytes <= bodies * kMostBytesOfBody) return;
-  scheduler.Fail(absl::StrCat("nobody holds anything, and ", cache.bytes,
-                              " bytes are counted, of these ", cache.reading_bytes,
-                              " for readers and ", cache.writing_bytes, " for writers"));
+  scheduler.Fail(absl::StrCat("nothing is in use, but ", cache.bytes,
+                              " bytes are counted: ", cache.reading_bytes, " for readers and ",
+                              cache.writing_bytes, " for writers"));
 }
 
 void RunClients(Simulation& simulation) {
@@ -114,7 +114,7 @@ void SimulateServers(const Plan& plan, SimulatedStore& database, Reached& reache
     Registry registry(store, limits, writers);
     if (plan.finds_records) registry.KeepRecords(plan.records);
     if (!registry.Load().ok())
-      Scheduler::Current().Fail("what the database keeps cannot be loaded");
+      Scheduler::Current().Fail("the contents of the database cannot be loaded");
     Simulation simulation{plan, database, registry, reached};
     RunClients(simulation);
     if (--working == 0) all_ended.Set();
@@ -210,7 +210,8 @@ void Simulate(Reached& reached) {
     WorkerPool writers(2);
     Registry registry(store, limits, writers);
     if (plan.finds_records) registry.KeepRecords(plan.records);
-    if (!registry.Load().ok()) Scheduler::Current().Fail("what the store keeps cannot be loaded");
+    if (!registry.Load().ok())
+      Scheduler::Current().Fail("the contents of the store cannot be loaded");
     Simulation simulation{plan, store, registry, reached};
     body(simulation);
     CheckAtRest(simulation);

@@ -103,7 +103,7 @@ struct Simulation {
 };
 
 // Runs one schedule: a registry over a store with faults and clients that call it, then a registry
-// over the data that the store kept. Or several registries over one database, which start and end
+// over the data that the store kept; or several registries over one database, which start and end
 // independently. The body of Scheduler::Run.
 void Simulate(Reached& reached);
 

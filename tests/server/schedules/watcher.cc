@@ -58,7 +58,7 @@ void Watcher::Receive(const HullChange& change) {
   const auto state = ledger.Find(hull, since, is_it);
   if (!state.has_value()) {
     Scheduler::Current().Fail(absl::StrCat("a watch at state ", reported_[hull], " reports ",
-                                           is_there ? "a hull" : "an end", " at revision ",
+                                           is_there ? "a hull" : "a deletion", " at revision ",
                                            change.record.revision, "; ", ledger.Describe(hull)));
   }
   if (!MayBeOfKind(hull, change, *state)) {

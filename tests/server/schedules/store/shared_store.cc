@@ -30,7 +30,7 @@ SharedStore::~SharedStore() {
 
 void SharedStore::Begin(const char* what, uint64_t number) {
   Scheduler& scheduler = Scheduler::Current();
-  if (is_busy_) scheduler.Fail("two calls use the turn, or ask for others, at the same time");
+  if (is_busy_) scheduler.Fail("two calls commit, fetch, or recover at the same time");
   is_busy_ = true;
   scheduler.Note(what, number);
 }
@@ -71,7 +71,7 @@ absl::StatusOr<std::vector<Vector>> SharedStore::LoadVertices(const StoredHull& 
   const SimulatedStore::StoredVertices* const kept = Find(hull.record);
   // A base replaces everything before it.
   if (kept == nullptr || kept->stored.layout.base_revision != hull.layout.base_revision) {
-    scheduler.Note("database: finds another hull than that of revision", hull.record.revision);
+    scheduler.Note("database: finds a different hull than that of revision", hull.record.revision);
     return Moved();
   }
   std::vector<Vector> points;
@@ -132,17 +132,17 @@ void SharedStore::NotePeerChanges() {
 }
 
 void SharedStore::StartFetch() {
-  Begin("database: is sent the question what others did since change", known_.seen);
+  Begin("database: receives a request for peer changes since change", known_.seen);
   if (!Scheduler::Current().random().OneIn(database_.faults_.read)) {
     const Known before = known_;
     NotePeerChanges();
     started_ = std::exchange(known_, before);
   }
-  End("database: has the question, at revision, change", absl::OkStatus()).IgnoreError();
+  End("database: has received the request, at revision, change", absl::OkStatus()).IgnoreError();
 }
 
 absl::Status SharedStore::Fetch() {
-  Begin("database: is asked what others did since change", known_.seen);
+  Begin("database: fetches peer changes since change", known_.seen);
   absl::Status status;
   // A server that cannot reach the database at its start ends.
   if (std::exchange(has_fetched_, true) &&
@@ -155,12 +155,12 @@ absl::Status SharedStore::Fetch() {
     NotePeerChanges();
   }
   started_.reset();
-  return End("database: has told what others did up to revision, change", status);
+  return End("database: has fetched peer changes up to revision, change", status);
 }
 
 absl::Status SharedStore::Commit(std::span<Change* const> changes) {
-  Begin("database: is to commit changes:", changes.size());
-  if (is_failing_) Scheduler::Current().Fail("a batch comes after an error without Recover");
+  Begin("database: begins to commit changes:", changes.size());
+  if (is_failing_) Scheduler::Current().Fail("a batch arrives after an error without Recover");
   ++database_.counts_.batches;
   const absl::Status status = CommitInTurn(changes);
   NoteEnd(!status.ok());
@@ -176,7 +176,7 @@ absl::Status SharedStore::CommitInTurn(std::span<Change* const> changes) {
     return status;
   };
   if (Scheduler::Current().random().OneIn(faults.refused))
-    return refuse(absl::UnavailableError("it cannot be reached"));
+    return refuse(absl::UnavailableError("the database cannot be reached"));
   NotePeerChanges();
   std::vector<Change*> kept;
   for (Change* change : changes) {
@@ -196,7 +196,7 @@ absl::Status SharedStore::CommitInTurn(std::span<Change* const> changes) {
   if (!is_unknown || Scheduler::Current().random().OneIn(2)) {
     for (const Change* change : kept) database_.Keep(*change, is_unknown);
   }
-  if (is_unknown) return absl::UnavailableError("nobody can tell whether it was committed");
+  if (is_unknown) return absl::UnavailableError("the outcome of the commit is unknown");
   known_.seen = database_.log_.size();
   known_.revision = database_.ledger_.revision();
   known_.totals = database_.totals();
@@ -204,10 +204,10 @@ absl::Status SharedStore::CommitInTurn(std::span<Change* const> changes) {
 }
 
 absl::Status SharedStore::Recover() {
-  Begin("database: is to be used again", 0);
+  Begin("database: recovers", 0);
   NoteEnd(false);
   ++database_.counts_.recovered;
-  return End("database: can be used again", absl::OkStatus());
+  return End("database: has recovered", absl::OkStatus());
 }
 
 void SharedStore::NoteEnd(bool failed) {

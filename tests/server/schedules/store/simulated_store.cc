@@ -69,7 +69,7 @@ absl::StatusOr<uint64_t> SimulatedStore::LoadSequence(const HullRecord& hull,
 absl::StatusOr<FoundRecords> SimulatedStore::FindRecords(std::span<const std::string> ids) {
   Scheduler& scheduler = Scheduler::Current();
   ++counts_.lookups;
-  scheduler.Note("store: is asked for records:", ids.size());
+  scheduler.Note("store: looks up records:", ids.size());
   if (Scheduler::Current().random().OneIn(faults_.read)) {
     ++counts_.failed_reads;
     ++counts_.failed_lookups;
@@ -125,7 +125,7 @@ StoreTotals SimulatedStore::totals() const {
 absl::Status SimulatedStore::Commit(std::span<Change* const> changes) {
   Scheduler& scheduler = Scheduler::Current();
   if (is_busy_) scheduler.Fail("two calls commit at the same time");
-  if (is_failing_) scheduler.Fail("a batch comes after an error without Recover");
+  if (is_failing_) scheduler.Fail("a batch arrives after an error without Recover");
   is_busy_ = true;
   ++counts_.batches;
   scheduler.Note("store: begins to commit changes:", changes.size());
@@ -164,7 +164,7 @@ absl::Status SimulatedStore::RefuseBatch(std::span<const Change* const> changes)
   }
   if (Scheduler::Current().random().OneIn(faults_.unknown)) {
     leave_unknown();
-    return absl::UnavailableError("the disk failed, and it is not known what it keeps");
+    return absl::UnavailableError("the disk failed, and its contents are unknown");
   }
   if (Scheduler::Current().random().OneIn(faults_.refused)) {
     ++counts_.refused;
@@ -175,7 +175,7 @@ absl::Status SimulatedStore::RefuseBatch(std::span<const Change* const> changes)
 
 absl::Status SimulatedStore::Recover() {
   Scheduler& scheduler = Scheduler::Current();
-  if (is_busy_) scheduler.Fail("the store is to recover while it commits");
+  if (is_busy_) scheduler.Fail("Recover is called during a commit");
   is_busy_ = true;
   scheduler.Note("store: recovers");
   const bool fails = is_dead_ || Scheduler::Current().random().OneIn(faults_.recover);
@@ -192,7 +192,7 @@ absl::Status SimulatedStore::Recover() {
 }
 
 absl::StatusOr<std::string> SimulatedStore::MakeCopy() {
-  return absl::FailedPreconditionError("there is no copy of what is simulated");
+  return absl::FailedPreconditionError("a simulated store cannot be copied");
 }
 
 void SimulatedStore::Reopen(const StoreFaults& faults) {
