@@ -150,7 +150,7 @@ std::string CheckSeconds(const std::string& text) {
   return absl::StrCat("\"", text, "\" is not a number of seconds from 0 to 86400");
 }
 
-// The settings of a Config bound to the options of one parser.
+// The settings of a Config bound to the options of a parser.
 class Parser {
  public:
   Parser()

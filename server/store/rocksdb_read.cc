@@ -123,8 +123,8 @@ absl::StatusOr<std::vector<Vector>> RocksDbStore::LoadVertices(const StoredHull&
   return std::move(assembly).Finish(std::move(status));
 }
 
-// Most hulls are one value: a base of one part, or a single delta. Other hulls and damaged values
-// are read one by one, which yields the precise error.
+// Most hulls are one value: a base with a single part, or a single delta. Other hulls and damaged
+// values are read one by one, which yields the precise error.
 std::vector<absl::StatusOr<std::vector<Vector>>> RocksDbStore::LoadVerticesOfEach(
     std::span<const StoredHull* const> hulls) {
   std::vector<std::string> keys;

@@ -25,7 +25,7 @@ namespace hulld::server {
 // the pending changes of hulls and bodies, answers the affected pairs again, and sends an event for
 // each pair whose answer differs. A round starts after the replies of the previous one are written.
 // Until then, messages wait in gRPC's window and changes coalesce in the feed, so a slow client
-// costs the memory of one message.
+// costs the memory of a single message.
 //
 // The mutex guards which task is running. The data of a round belongs to that task alone.
 class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchCollisionsResponse>,

@@ -20,7 +20,7 @@
 
 namespace hulld::server {
 
-// The hulls and bodies of one collision watch, with the hulls of the bodies' pieces. Resolves them
+// The hulls and bodies of a collision watch, with the hulls of the bodies' pieces. Resolves them
 // again whenever they change.
 //
 // Invariant: after each round, everything that uses a hull uses the same version of it, which the

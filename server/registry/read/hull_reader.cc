@@ -363,7 +363,7 @@ std::optional<Resolved> HullReader::TryResolve(std::span<const std::string> ids,
     const auto staleness = barrier_.TryFresh(locked, plan.freshness);
     if (!staleness.has_value()) return std::nullopt;
     resolved.as_of.staleness = *staleness;
-    // Refresh reports the error, unless it no longer occurs by then.
+    // Refresh reports the error, unless it no longer occurs when it runs.
     if (!LookUpDue(locked, {ids, known, should_stop, plan, false}).ok()) return std::nullopt;
     resolved.as_of.revision = state_.catalog.revision();
   }

@@ -22,7 +22,7 @@ HullChange DeletionOf(const std::string& id, uint64_t revision, bool is_body) {
 
 }  // namespace
 
-// The watches of one target, and the changes that some of them have not reported.
+// The watches of a target, and the changes that some of them have not reported.
 struct WatchGroup {
   // The last change of a hull.
   struct Pending {
