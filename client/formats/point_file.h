@@ -23,9 +23,9 @@ absl::StatusOr<PointFormat> PointFormatOfPath(const std::string& path);
 // Returns true if ReadMesh (mesh_file.h) can read triangles of the format.
 bool IsMeshFormat(PointFormat format);
 
-// Reads the points of a file and passes them on in blocks, in the file's order; blocks before an
-// error are delivered. Text becomes the nearest double; binary scalars are kept unchanged. Errors
-// of the file are INVALID_ARGUMENT and name file and line, or file and byte. Errors of `receive`
+// Reads the points of a file and passes them to `receive` in blocks, in file order, up to the first
+// error. Text is rounded to the nearest double; binary scalars are kept unchanged.
+// INVALID_ARGUMENT: a defect of the file; names the file, and the line or byte. Errors of `receive`
 // are returned unchanged.
 //
 // Points by format: obj: each `v` (weights and colors are ignored); off, ply, pcd, las: each

@@ -18,11 +18,10 @@
 
 namespace hulld {
 
-// A COLLADA document (Khronos: 1.4.1, 2008; 1.5, 2008, ISO/PAS 17506): XML whose elements refer to
-// each other by ID. Namespace prefixes are ignored. Entities other than those of XML itself are
-// not expanded.
+// A COLLADA document: XML elements that refer to each other by ID. Ignores namespace prefixes.
+// Expands only the entities that XML predefines. Sources: Khronos, COLLADA 1.4.1 and 1.5 (2008).
 //
-// Stores the first error; after it, results are empty or zero, and callers return.
+// Stores the first error. After an error, functions return empty or zero results, and callers stop.
 class DaeDocument {
  public:
   // source: must outlive this.

@@ -23,9 +23,10 @@ struct RobotArguments {
   std::string urdf;
   // NAME=DIR each.
   std::vector<std::string> packages;
-  // How meshes are split into pieces: "names", "components", or "none"; empty: automatic.
+  // Splits meshes into pieces by "names" or "components", or not ("none"). Empty: automatic.
   std::string split;
-  // ID prefix under which the hulls of the links are kept; empty: they are sent with each query.
+  // ID prefix for registering the hulls of the links. Empty: each query sends them as inline
+  // shapes.
   std::string prefix;
 };
 

@@ -15,7 +15,7 @@
 
 namespace hulld {
 
-// How the bodies defined by a YAML scene are placed.
+// The form in which a scene places the bodies that its YAML file defines.
 enum class BodyForm {
   // As bodies of the server, created by 'hullctl scene apply'; poses compose exactly.
   kWhole,

@@ -734,9 +734,12 @@ class Client(ClientBase):
         freshness: Freshness | None = None,
         timeout: float | None = None,
     ) -> CollisionStream:
-        """Opens a stream of pose changes, and answers every pair once. only_changes: answers to
-        updates contain only pairs whose relation changed. orthogonality_tolerance: also applies to
-        all updates. timeout: for each answer. Other arguments are as in check_collisions."""
+        """Opens a stream of pose changes. The first answer contains every pair.
+
+        only_changes: later answers contain only the pairs whose relation changed. The
+        orthogonality_tolerance also applies to updates, and the timeout to each answer. Other
+        arguments are as in check_collisions.
+        """
         packed = Placements.of(placements, orthogonality_tolerance=orthogonality_tolerance)
         asked = all_pairs(len(packed)) if pairs is None else as_pairs(pairs, len(packed))
         wanted = Wanted(

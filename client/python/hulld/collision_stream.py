@@ -78,16 +78,16 @@ class CollisionStream:
     def update(
         self, placements: npt.ArrayLike, poses: PosesLike, *, refresh_hulls: bool = False
     ) -> StreamAnswer:
-        """Moves placements. Answers every pair of a moved placement; with only_changes, every pair
-        whose relation changed.
+        """Moves placements. The answer contains every pair with a moved placement or, with
+        only_changes, the pairs whose relation changed.
 
-        placements: k indices into the placements of the stream, each at most once. poses: the new
-        pose of each: k x 7, k x 4 x 4, or k x 3. refresh_hulls: first resolves every hull again; a
-        hull that changed counts as moved.
+        placements: k distinct indices into the placements of the stream. poses: their new poses,
+        k x 7, k x 4 x 4, or k x 3. refresh_hulls: resolves every hull again before answering; a
+        placement whose hull changed counts as moved.
 
-        ValueError, before anything is sent; the stream remains usable: an index out of range,
-        malformed poses, or not k of them. HulldError: the stream has ended; every later call raises
-        the error again.
+        ValueError: an index is out of range, a pose is malformed, or there are not k poses. Nothing
+        was sent, and the stream remains usable. HulldError: the stream has ended; all later calls
+        raise the same error.
         """
         moved = check_update(placements, poses, self._placements, self._orthogonality_tolerance)
         self._ensure_open()

@@ -230,14 +230,14 @@ def local(
     binary: PathLike | None = None,
     **client: Any,
 ) -> Local:
-    """Runs a server for a script or a test, with a client:
+    """Starts a private server and connects a client to it, for a script or a test:
 
         with hulld.local() as client:
             ...
 
-    The arguments are those of LocalServer; others, such as timeout, are passed to the client. The
-    server ends with the context, and its hulls are lost unless data_dir is set. `async with` gives
-    an AsyncClient.
+    Arguments other than those of LocalServer, such as timeout, are passed to the client. The server
+    stops when the context exits; its hulls are lost unless data_dir is set. With `async with`, the
+    client is an AsyncClient.
     """
     return Local(LocalServer(data_dir=data_dir, options=options, binary=binary), client)
 

@@ -88,7 +88,7 @@ class Mesh:
 
 
 def enclosed_volume(vertices: Points, triangles: npt.NDArray[Any]) -> float:
-    """The volume within a closed mesh."""
+    """Returns the volume of a closed mesh."""
     a, b, c = (vertices[triangles[:, corner]] - vertices[0] for corner in range(3))
     return abs(float((a * np.cross(b, c)).sum())) / 6
 
@@ -96,11 +96,11 @@ def enclosed_volume(vertices: Points, triangles: npt.NDArray[Any]) -> float:
 def read_pieces(
     path: pathlib.Path, scale: Scale, split: bool, load_mesh: MeshLoader | None
 ) -> list[tuple[Points, float]]:
-    """The points of a mesh file, each coordinate times its scale factor, rounded once; and the
-    volume of the mesh, 0 if unknown.
+    """Reads a mesh file. Returns the points and volume of each piece; the volume is 0 if unknown.
 
-    split: returns each part of a file whose named parts are all convex. load_mesh: reads the file;
-    None: this module reads STL and OBJ. ValueError names the file and its defect.
+    Each coordinate is multiplied by its scale factor and rounded once. split: if all named parts of
+    the file are convex, returns them as separate pieces. load_mesh: reads the file; if None, only
+    STL and OBJ are supported. ValueError: the file cannot be read; names the file and the defect.
     """
     if load_mesh is not None:
         points = as_points(load_mesh(path), str(path)).astype(np.float64)
