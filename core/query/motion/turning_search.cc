@@ -297,8 +297,10 @@ absl::StatusOr<std::optional<TurningSearch::Step>> TurningSearch::NextStep() {
 
 // Returns true if an exact direction may give a much longer step.
 bool TurningSearch::IsPoor(const Step& step) const {
+  // If the gap closes as before, this share of the last length is left to the contact.
+  const double left = last_gap_ < kInfinity ? std::min(1.0, step.gap / last_gap_) : 1;
   return !exact_ && step.gap <= kExactShare * plane_.size() &&
-         step.until - separated_ < kPoorShare * last_length_;
+         step.until - separated_ < kPoorShare * left * last_length_;
 }
 
 // Returns a time at which contact is likely, with `gap` along the nearest direction n: the zero of
