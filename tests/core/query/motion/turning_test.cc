@@ -92,7 +92,7 @@ TEST(Turning, RandomMotionsAgreeWithSamples) {
 TEST(Turning, PiecesWithAPoseAgreeWithSamples) {
   Random random(TestSeed(3));
   std::array<int, 4> relations = {};
-  for (int round = 0; round < 24; ++round) {
+  for (int round = 0; round < 72; ++round) {
     SCOPED_TRACE(round);
     const Pose X_AP = round % 4 == 0 ? Pose{{3, 0, 0, 0}, Vector(1, 0, 0)} : RandomPose(random, 1);
     const OwnMoving a(RandomInBall(random, random.Between(4, 6), 1),
@@ -134,7 +134,7 @@ TEST(Turning, PairsAtATimeHaveTheExactRelation) {
     for (int i = 0; i < 3; ++i) pose.t[i] = random.Between(-most, most);
     return pose;
   };
-  for (int round = 0; round < 80; ++round) {
+  for (int round = 0; round < 240; ++round) {
     SCOPED_TRACE(round);
     const OwnMoving a(RandomLatticePoints(random, 4, 3), {lattice_pose(1), lattice_pose(1)});
     const OwnMoving b(RandomLatticePoints(random, 4, 3), {lattice_pose(3), lattice_pose(3)}, 0,
