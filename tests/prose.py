@@ -37,8 +37,8 @@ START = re.compile(
     r"(What|Whether|Whose|Those|Who|Which|How|Where|Than|Of|Told|The same|As (in|above|there))\b"
 )
 # Shorter texts have no meaningful rates.
-LEAST_WORDS = 500
-LEAST_PARAGRAPHS = 100
+MIN_WORDS = 500
+MIN_PARAGRAPHS = 100
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 PATHS = ("core", "server", "client", "proto", "docker", "tests", "README.md", ".github")
@@ -104,13 +104,13 @@ def excess_of(paragraphs: list[Paragraph]) -> list[str]:
     for _, _, text in paragraphs:
         hits += count_hits(text)
     excess = []
-    if words > LEAST_WORDS:
+    if words > MIN_WORDS:
         for word, limit in WORD_LIMITS.items():
             rate = 1000 * hits[word] / words
             if rate > limit:
                 excess.append(f'"{word}" {rate:.1f} times per 1,000 words (limit {limit})')
     starts = sum(bool(START.match(text)) for _, _, text in paragraphs)
-    if len(paragraphs) > LEAST_PARAGRAPHS and 100 * starts > START_LIMIT * len(paragraphs):
+    if len(paragraphs) > MIN_PARAGRAPHS and 100 * starts > START_LIMIT * len(paragraphs):
         share = 100 * starts / len(paragraphs)
         excess.append(f"{share:.1f} % of paragraphs start with a pronoun (limit {START_LIMIT} %)")
     return excess

@@ -105,7 +105,7 @@ TEST(Includes, FoldersDependOnEachOtherInOneDirection) {
 }
 
 TEST(Includes, NoFolderIsCrowded) {
-  constexpr int kMostFiles = 24;
+  constexpr int kMaxFiles = 24;
   const fs::path root = SourceTree();
   for (const std::string top : {"core", "server", "client", "tests", "proto", "docker"}) {
     std::map<std::string, int> files;
@@ -113,7 +113,7 @@ TEST(Includes, NoFolderIsCrowded) {
       if (!entry.is_regular_file()) continue;
       ++files[fs::relative(entry.path().parent_path(), root).string()];
     }
-    for (const auto& [folder, count] : files) EXPECT_LE(count, kMostFiles) << folder;
+    for (const auto& [folder, count] : files) EXPECT_LE(count, kMaxFiles) << folder;
   }
 }
 

@@ -17,9 +17,9 @@ using Point = std::array<double, 3>;
 // and three sums add at most 2^-50 of the sum of all magnitudes. This bound exceeds both.
 constexpr double kFilterError = 0x1p-48;
 // Within these bounds, no product or sum of the filter overflows or loses digits to underflow.
-constexpr double kLeastSize = 0x1p-800;
-constexpr double kMostSize = 0x1p800;
-constexpr double kLeastNormal = 0x1p-500;
+constexpr double kMinSize = 0x1p-800;
+constexpr double kMaxSize = 0x1p800;
+constexpr double kMinNormal = 0x1p-500;
 
 Point PointAt(const std::vector<double>& xyz, size_t i) {
   return {xyz[3 * i], xyz[3 * i + 1], xyz[3 * i + 2]};
@@ -134,7 +134,7 @@ HalfSpace::HalfSpace(BigVector normal, BigInteger offset, const CommonExponent& 
   unit_offset_ = Approximate(offset_, grid.exponent() - bits);
   // Without a finite offset, the filter decides nothing.
   for (size_t i = 0; i < 3; ++i) {
-    if (normal_[i] != 0 && std::abs(unit_normal_[i]) < kLeastNormal) unit_offset_ = HUGE_VAL;
+    if (normal_[i] != 0 && std::abs(unit_normal_[i]) < kMinNormal) unit_offset_ = HUGE_VAL;
   }
 }
 
@@ -144,7 +144,7 @@ int HalfSpace::Side(const Point& p, const BigVector& P) const {
   const double z = unit_normal_[2] * p[2];
   const double height = x + y + z - unit_offset_;
   const double size = std::abs(x) + std::abs(y) + std::abs(z) + std::abs(unit_offset_);
-  if (size > kLeastSize && size < kMostSize) {
+  if (size > kMinSize && size < kMaxSize) {
     if (height > kFilterError * size) return 1;
     if (height < -kFilterError * size) return -1;
   }

@@ -26,7 +26,7 @@ import generate_aio  # noqa: E402
 
 
 def version():
-    """The version of the whole project, which CMakeLists.txt holds."""
+    """The version of the whole project, which CMakeLists.txt contains."""
     text = (HERE.parent.parent / "CMakeLists.txt").read_text(encoding="utf-8")
     return re.search(r"^project\(hulld VERSION ([0-9.]+)", text, re.MULTILINE)[1]
 

@@ -34,9 +34,9 @@ struct MotionBound {
   // computed poses at the ends of a time span of this duration, at the same time, for normalized
   // quaternions that are not negated.
   //
-  // Requires duration * turn <= kMostTurn, so that the rotation of that motion does not vanish.
+  // Requires duration * turn <= kMaxTurn, so that the rotation of that motion does not vanish.
   double Deviation(double duration, double reach) const;
-  static constexpr double kMostTurn = 2;
+  static constexpr double kMaxTurn = 2;
 };
 
 // Returns the bound of each link's frame. Requires values of AllJointValues aligned by AlignTurns

@@ -17,7 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kPackageDepth = 3;
-constexpr size_t kMostFolders = 10000;
+constexpr size_t kMaxFolders = 10000;
 
 bool IsFile(const fs::path& path) {
   std::error_code ignored;
@@ -45,7 +45,7 @@ std::vector<fs::path> PackagesBelow(const fs::path& folder, const std::string& p
            entry.increment(failed)) {
         std::error_code ignored;
         if (!entry->is_directory(ignored) || entry->path().filename().string()[0] == '.') continue;
-        if (++seen > kMostFolders) return found;
+        if (++seen > kMaxFolders) return found;
         if (entry->path().filename() == package) found.push_back(entry->path());
         next.push_back(entry->path());
       }
@@ -123,11 +123,11 @@ absl::StatusOr<std::string> ResolveFile(const PackagePaths& paths, const std::st
       tried.push_back(folder.string());
     }
   }
-  constexpr size_t kMostNamed = 8;
-  const size_t more = tried.size() > kMostNamed ? tried.size() - kMostNamed : 0;
+  constexpr size_t kMaxNamed = 8;
+  const size_t more = tried.size() > kMaxNamed ? tried.size() - kMaxNamed : 0;
   tried.resize(tried.size() - more);
   return absl::NotFoundError(absl::StrCat(
-      "no folder of the package ", Quoted(package), " holds ", rest.substr(slash + 1),
+      "no folder of the package ", Quoted(package), " contains ", rest.substr(slash + 1),
       "; set its folder with --package ", package, "=DIR (looked in ", absl::StrJoin(tried, ", "),
       more > 0 ? absl::StrCat(" and ", more, " more") : "", ")"));
 }

@@ -121,8 +121,8 @@ class TagWalk {
       SkipSpace();
       if (at_ >= text_.size()) return Error(absl::StrCat("the tag <", name, " is not closed by >"));
       if (text_[at_] == '>') {
-        if (open_.size() >= kMostXmlDepth) {
-          return Error(absl::StrCat("elements are nested deeper than ", kMostXmlDepth));
+        if (open_.size() >= kMaxXmlDepth) {
+          return Error(absl::StrCat("elements are nested deeper than ", kMaxXmlDepth));
         }
         open_.push_back({name, line});
         Advance(1);

@@ -20,7 +20,7 @@ struct XmlDocument {
 };
 
 // Maximum nesting depth of elements. Bounds the recursion of TinyXML.
-inline constexpr size_t kMostXmlDepth = 100;
+inline constexpr size_t kMaxXmlDepth = 100;
 
 // Parses well-formed XML without a document type. INVALID_ARGUMENT names the line: a tag that is
 // not closed, or closed by another one; a document type; a macro of xacro, which must be expanded

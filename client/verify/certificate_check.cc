@@ -14,15 +14,15 @@ namespace hulld {
 namespace {
 
 // Limit of the contract: Steinitz's number for an interior point.
-constexpr int kMostOverlappingPairs = 6;
+constexpr int kMaxOverlappingPairs = 6;
 // Far above the digits of a cross product of coordinates of degree nine in doubles.
-constexpr size_t kMostDigits = 100'000;
+constexpr size_t kMaxDigits = 100'000;
 
 absl::Status ReadInteger(const std::string& text, BigInteger* number) {
   const size_t sign = !text.empty() && text[0] == '-' ? 1 : 0;
   const bool digits = std::all_of(text.begin() + static_cast<ptrdiff_t>(sign), text.end(),
                                   [](char c) { return c >= '0' && c <= '9'; });
-  if (text.size() == sign || text.size() > kMostDigits || !digits) {
+  if (text.size() == sign || text.size() > kMaxDigits || !digits) {
     return ProofFails("integer_direction is not a decimal integer");
   }
   // Boost would parse a leading 0 as octal.
@@ -93,7 +93,7 @@ absl::Status CheckPairs(const v1::Certificate& certificate, int most, const Exac
 
 absl::Status CheckTouching(const v1::Certificate& certificate, const ExactHull& a,
                            const ExactHull& b) {
-  const auto differences = DifferencesOf(certificate, kMostTouchingPairs, a, b);
+  const auto differences = DifferencesOf(certificate, kMaxTouchingPairs, a, b);
   if (!differences.ok()) return differences.status();
   BigVector n;
   if (absl::Status s = ReadDirection(certificate, &n); !s.ok()) return s;
@@ -107,7 +107,7 @@ absl::Status CheckTouching(const v1::Certificate& certificate, const ExactHull& 
 
 absl::Status CheckOverlapping(const v1::Certificate& certificate, const ExactHull& a,
                               const ExactHull& b) {
-  const auto differences = DifferencesOf(certificate, kMostOverlappingPairs, a, b);
+  const auto differences = DifferencesOf(certificate, kMaxOverlappingPairs, a, b);
   if (!differences.ok()) return differences.status();
   if (HoldsOriginInside(*differences)) return absl::OkStatus();
   return ProofFails("0 is not inside the hull of the differences of the vertex pairs");
@@ -133,7 +133,7 @@ absl::Status CheckRounded(v1::Relation relation, const v1::Certificate& certific
     if (is_separated) return absl::OkStatus();
   }
   const auto differences =
-      DifferencesOf(certificate, is_touching ? kMostTouchingPairs : kMostOverlappingPairs, a, b);
+      DifferencesOf(certificate, is_touching ? kMaxTouchingPairs : kMaxOverlappingPairs, a, b);
   if (!differences.ok()) return differences.status();
   const BigInteger r = RadiiOf(a, b);
   if (ComesWithin(*differences, r * r, /*nearer=*/!is_touching)) return absl::OkStatus();

@@ -34,7 +34,7 @@ absl::Status ReadDirection(const v1::Certificate& certificate, BigVector* n,
                            int* exponent = nullptr);
 
 // Limit of the contract: Caratheodory's number for a point of a hull.
-inline constexpr int kMostTouchingPairs = 4;
+inline constexpr int kMaxTouchingPairs = 4;
 
 // Returns the points of A - B that the vertex pairs represent, times both scales.
 // FAILED_PRECONDITION: more than `most` pairs, or one that names no vertex.

@@ -390,7 +390,7 @@ absl::Status CheckBriefContact(const MovingPair& pair, const v1::FirstContact& c
   std::vector<BigVector> span;
   for (const double time : {contact.separated_until(), contact.contact_time()}) {
     const auto differences =
-        DifferencesOf(certificate, kMostTouchingPairs, pair.a.HullAt(time), pair.b.HullAt(time));
+        DifferencesOf(certificate, kMaxTouchingPairs, pair.a.HullAt(time), pair.b.HullAt(time));
     if (!differences.ok()) return differences.status();
     span.insert(span.end(), differences->begin(), differences->end());
   }

@@ -53,7 +53,7 @@ absl::Status CheckVertices(const Hull& hull, StopPoll& poll) {
     if (poll.Step()) return Stopped();
     for (int k = 0; k < 3; ++k) {
       if (!std::isfinite(v[i][k])) return Finding("vertex ", i, " is not finite");
-      if (v[i][k] == 0 && std::signbit(v[i][k])) return Finding("vertex ", i, " holds -0");
+      if (v[i][k] == 0 && std::signbit(v[i][k])) return Finding("vertex ", i, " has -0");
     }
     if (i > 0 &&
         !std::lexicographical_compare(v[i - 1].begin(), v[i - 1].end(), v[i].begin(), v[i].end())) {

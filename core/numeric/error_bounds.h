@@ -54,7 +54,7 @@ inline constexpr double kDirectionMapMargin = 0x1p-20;
 // The distance |p - (s e + t f)| for differences p, e, f of doubles and s, t in [0, 1] with rounded
 // sum at most 1 (exact sum at most 1 + u): components err by at most 4 u (|p| + |e| + |f|), the
 // norm by sqrt(3) of that and 8 u of itself; a sum of s and t above 1 by u moves the point by at
-// most 2 u (|e| + |f|). 32 u covers these errors, and kLeastPositive covers underflow, here and in
+// most 2 u (|e| + |f|). 32 u covers these errors, and kMinPositive covers underflow, here and in
 // the scaling of the coordinates. Proven.
 inline constexpr double kSubsetDistanceErrorFactor = 32 * kUnitRoundoff;
 
@@ -68,7 +68,7 @@ inline constexpr double kSubsetDistanceErrorFactor = 32 * kUnitRoundoff;
 // entry exceeds 1. If q is itself a product of two quaternions, with each component rounded once
 // (pose_product.h), a numerator changes by 2 u |q|^2 and the squared norm by 2 u of itself, 4 u of
 // an entry: 12 u + 100 u^2 < 16 u in total. If its first factor is interpolated
-// (kInterpolationLeastRemainder), each component of the product errs by 2 * 18 u^2 |q_P| more, at
+// (kInterpolationMinRemainder), each component of the product errs by 2 * 18 u^2 |q_P| more, at
 // most 2^-7 u |q|, and entries by 8 times that. Proven.
 inline constexpr double kRotationEntryError = 16 * kUnitRoundoff;
 
@@ -169,7 +169,7 @@ inline constexpr double kSphereErrorFactor = 256 * kUnitRoundoff;
 inline constexpr double kSphereSquareRoundUp = 1 + 16 * kUnitRoundoff;
 
 // Bounds about a hull's center c (center_bounds.h). They exist only if the radius R, the largest |v
-// - c|, and the least reach from c along a corner's direction are at least kCenterLeastRadius M. At
+// - c|, and the least reach from c along a corner's direction are at least kCenterMinRadius M. At
 // a corner, the support value errs by 64 u M (16 u M, the blur 32 u M, n . c and the difference) <=
 // 2^-27 R. The point p proven to be inside is off the corner's ray by e <= 6 u M, so the gauge g is
 // at most (1 + e g_max) / t for p at t, with g_max <= (1 + 2^-29) / least t and g <= (1 + 2^-30) /
@@ -177,7 +177,7 @@ inline constexpr double kSphereSquareRoundUp = 1 + 16 * kUnitRoundoff;
 // into the hull's frame by 57 u. The margin covers these errors for the support function, times R
 // and the largest component of the direction; and for the gauge, the errors relative to the gauge
 // itself. Proven.
-inline constexpr double kCenterLeastRadius = 0x1p-20;
+inline constexpr double kCenterMinRadius = 0x1p-20;
 inline constexpr double kCenterMargin = 0x1p-20;
 
 // n . (a - b) over all vertices against the support functions along n about the centers, with n the
@@ -294,7 +294,7 @@ inline constexpr double kUnitLengthRoundUp = 1 + 16 * kUnitRoundoff;
 // 520 u * 2 * 6.93 and 4 u * 48: below 14700 u; its product with p by 3 * 3.47 * 14700 u and 3 * 96
 // * 256 u; products, sums and the length by less than 18000 u. The total is below 245000 u, and
 // 2^18 u is 262144 u. A value above that is certainly positive. Proven.
-inline constexpr double kLeastOutward = 0x1p-35;
+inline constexpr double kMinOutward = 0x1p-35;
 
 // The angle between a direction of integers and its rounding to unit length (UnitDirection), in
 // radians. Components err by 2 u of the largest (kScaledDoublesError), so the vector by 2 sqrt(3) u

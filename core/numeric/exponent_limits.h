@@ -11,7 +11,7 @@ namespace hulld {
 
 // The largest finite double, and the least positive one.
 inline constexpr double kLargestDouble = std::numeric_limits<double>::max();
-inline constexpr double kLeastDouble = std::numeric_limits<double>::denorm_min();
+inline constexpr double kMinDouble = std::numeric_limits<double>::denorm_min();
 
 // Above the exponent of any double's lowest bit.
 inline constexpr int kAboveAllExponents = 1024;
@@ -72,7 +72,7 @@ inline constexpr double kDualMinReach = 0x1p-300;
 
 // The contribution of underflow to the distance from a triangle (see kSubsetDistanceErrorFactor)
 // and to a radius. Proven.
-inline constexpr double kLeastPositive = 0x1p-1060;
+inline constexpr double kMinPositive = 0x1p-1060;
 
 // Queries in floating point. S is the size of a pair: M_A + M_B + |t_B - t_A|, where M is a hull's
 // largest absolute coordinate and |.| the largest absolute component. The stage runs only for S
@@ -99,18 +99,18 @@ inline constexpr double kQuaternionMax = 0x1p100;
 
 // Composition of poses in double-double arithmetic (pose_product.h). Translations up to
 // kProductMaxTranslation, added, are split without overflow. If the largest component of a
-// quaternion is in [1/2, 1), components below kProductLeastComponent are omitted: entries change by
+// quaternion is in [1/2, 1), components below kProductMinComponent are omitted: entries change by
 // less than 2^-127, far below the slack of kProductTranslationError. Components of translations
 // below a quarter of kProductUnderflow are omitted as well, which the bound includes. Non-zero
 // entries are then above 2^-400, and no significant product underflows. Proven.
 inline constexpr double kProductMaxTranslation = 0x1p400;
-inline constexpr double kProductLeastComponent = 0x1p-130;
+inline constexpr double kProductMinComponent = 0x1p-130;
 inline constexpr double kProductUnderflow = 0x1p-600;
 
 // The interpolated quaternion of a motion, (1 - t) q0 + t q1 with components up to 1, in
 // double-double arithmetic (Interpolated), which errs by at most 18 u^2. If the largest component
 // of the result is at least this, the error is below 2^-8 u of it. Proven.
-inline constexpr double kInterpolationLeastRemainder = 0x1p-40;
+inline constexpr double kInterpolationMinRemainder = 0x1p-40;
 
 // Planes of pairs in motion (see kMotionPlaneErrorFactor): the largest absolute coordinate of a
 // hull plus that of its translations is at most the maximum, so that nothing overflows. A smaller

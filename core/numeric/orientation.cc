@@ -92,12 +92,12 @@ std::optional<int> FilteredFromNearest(const FourPoints& points) {
       sizes[j] += exponent;
     }
   }
-  constexpr int kLeastGain = 4;
+  constexpr int kMinGain = 4;
   constexpr int kLargestInRange = 900;
   const auto nearest =
       static_cast<size_t>(std::min_element(sizes.begin(), sizes.end()) - sizes.begin());
   const bool was_in_range = std::abs(sizes[0]) <= kLargestInRange;
-  if (was_in_range && sizes[nearest] > sizes[0] - kLeastGain) return std::nullopt;
+  if (was_in_range && sizes[nearest] > sizes[0] - kMinGain) return std::nullopt;
   // Moving the origin to the front reverses the orientation if its index is odd.
   const Vector& origin = points[nearest];
   std::array<Vector, 3> differences;

@@ -17,7 +17,7 @@ namespace {
 constexpr int kQuotientBits = 128;
 
 // The exponent of the least double.
-constexpr int kLeastExponent = -1074;
+constexpr int kMinExponent = -1074;
 
 int BitsOf(const Integer& value) {
   return value.is_zero() ? 0 : static_cast<int>(msb(Integer(abs(value)))) + 1;
@@ -35,8 +35,8 @@ Rounded Round(double mantissa, int exponent) {
   if (std::isinf(value)) {
     return {std::copysign(kLargestDouble, mantissa), std::numeric_limits<double>::infinity()};
   }
-  if (value == 0) return {std::copysign(kLeastDouble, mantissa), kLeastDouble};
-  return {value, std::abs(value) * kRoundedRelativeError + kLeastDouble};
+  if (value == 0) return {std::copysign(kMinDouble, mantissa), kMinDouble};
+  return {value, std::abs(value) * kRoundedRelativeError + kMinDouble};
 }
 
 // A square root as mantissa * 2^exponent, rounded down, with a relative error below 2^-63.
@@ -84,8 +84,8 @@ Rounded RoundToNearest(const Integer& numerator, const Integer& denominator, int
   if (numerator.is_zero()) return {0, 0};
   // The quotient has 62 or 63 bits: at least two more than a double, and its unit is at most a
   // quarter of the least double.
-  constexpr int kLeastUnit = kLeastExponent - 2;
-  const int unit = std::max(BitsOf(numerator) - BitsOf(denominator) + exponent - 62, kLeastUnit);
+  constexpr int kMinUnit = kMinExponent - 2;
+  const int unit = std::max(BitsOf(numerator) - BitsOf(denominator) + exponent - 62, kMinUnit);
   const int shift = exponent - unit;
   Integer quotient;
   Integer remainder;
@@ -93,7 +93,7 @@ Rounded RoundToNearest(const Integer& numerator, const Integer& denominator, int
             Integer(denominator << std::max(-shift, 0)), quotient, remainder);
   // Sets the lowest bit if any bit below it is set (sticky bit).
   const uint64_t bits = static_cast<uint64_t>(quotient) | (remainder.is_zero() ? 0 : 1);
-  const int dropped = std::max(static_cast<int>(std::bit_width(bits)) - 53, kLeastExponent - unit);
+  const int dropped = std::max(static_cast<int>(std::bit_width(bits)) - 53, kMinExponent - unit);
   const uint64_t half = uint64_t{1} << (dropped - 1);
   const uint64_t rest = bits & (2 * half - 1);
   uint64_t kept = bits >> dropped;
@@ -101,7 +101,7 @@ Rounded RoundToNearest(const Integer& numerator, const Integer& denominator, int
   const double sign = Sign(numerator) < 0 ? -1 : 1;
   const double value = std::ldexp(static_cast<double>(kept), unit + dropped);
   if (std::isinf(value)) return {sign * kLargestDouble, kInfinity};
-  const double bound = std::max(std::ldexp(1.0, unit + dropped - 1), kLeastDouble);
+  const double bound = std::max(std::ldexp(1.0, unit + dropped - 1), kMinDouble);
   return {value == 0 ? 0 : sign * value, rest == 0 ? 0 : bound};
 }
 

@@ -64,7 +64,7 @@ BoxTree::BoxTree(std::span<const Box> boxes, const std::function<bool()>& should
   nodes_.resize(NodesOf(static_cast<uint32_t>(boxes.size())));
   indices_.resize(boxes.size());
   boxes_.resize(boxes.size());
-  if (boxes.size() <= kMostUnshared) threads = 1;
+  if (boxes.size() <= kMaxUnshared) threads = 1;
 #pragma omp parallel num_threads(threads) if (threads > 1)
 #pragma omp single
   Build(boxes, items, 0, 0, should_stop);
@@ -104,7 +104,7 @@ void BoxTree::Build(std::span<const Box> boxes, std::span<Item> items, uint32_t 
     }
     return;
   }
-  if (count > kMostUnshared && StopPoll(should_stop).Poll()) return;
+  if (count > kMaxUnshared && StopPoll(should_stop).Poll()) return;
   Box centers = Box::Empty();
   for (const Item& item : items) {
     centers = {centers.low.cwiseMin(item.center), centers.high.cwiseMax(item.center)};
@@ -119,7 +119,7 @@ void BoxTree::Build(std::span<const Box> boxes, std::span<Item> items, uint32_t 
                      return x < y || (x == y && i.index < j.index);
                    });
   node.second = index + 1 + NodesOf(half);
-  if (count > kMostUnshared) {
+  if (count > kMaxUnshared) {
 #pragma omp task shared(should_stop)
     Build(boxes, items.first(half), begin, index + 1, should_stop);
     Build(boxes, items.subspan(half), begin + half, node.second, should_stop);
@@ -152,7 +152,7 @@ bool BoxTree::AppendMeeting(const Box& box, uint32_t first, uint64_t nodes, Curs
     const Node& node = nodes_[index];
     if (node.largest_index < first || !node.box.Meets(box)) continue;
     if (node.second != 0) {
-      HULLD_DCHECK(cursor.height_ + 2 <= Cursor::kMostWaiting);
+      HULLD_DCHECK(cursor.height_ + 2 <= Cursor::kMaxWaiting);
       cursor.waiting_[cursor.height_++] = node.second;
       cursor.waiting_[cursor.height_++] = index + 1;
       continue;

@@ -44,8 +44,8 @@ class BoxTree {
    private:
     friend class BoxTree;
     // Halving leaves at most 32 levels.
-    static constexpr int kMostWaiting = 40;
-    uint32_t waiting_[kMostWaiting];
+    static constexpr int kMaxWaiting = 40;
+    uint32_t waiting_[kMaxWaiting];
     int height_ = 0;
   };
 
@@ -101,7 +101,7 @@ class BoxTree {
     uint32_t index;
   };
   // Maximum number of boxes in a part that is not shared by threads: about 200 us of work.
-  static constexpr uint32_t kMostUnshared = 2048;
+  static constexpr uint32_t kMaxUnshared = 2048;
 
   static uint32_t NodesOf(uint32_t boxes);
   // Builds the node `index` and those below it. `begin`: the position of the first item.

@@ -59,11 +59,11 @@ bool CentersMaySettle(const FloatPair& pair, const PlainVector& n) {
 // or nearly cancel. Not inlined, to keep the path of distant pairs short.
 [[gnu::noinline]] std::optional<Relation> LookAtCenters(const FloatPair& pair, const PlainVector& n,
                                                         PlainVector& first) {
-  constexpr double kLeastLikely = 0x1p-4;
+  constexpr double kMinSquaredNorm = 0x1p-4;
   if (!CentersMaySettle(pair, n)) return std::nullopt;
   const FloatPair::CenterView view = pair.ViewCenters(n);
   if (const std::optional<Relation> relation = CompareOnCenterLine(pair, n, view)) return relation;
-  if (const PlainVector likely = view.LikelyAxis(); SquaredNorm(likely) > kLeastLikely) {
+  if (const PlainVector likely = view.LikelyAxis(); SquaredNorm(likely) > kMinSquaredNorm) {
     first = likely;
   }
   return std::nullopt;

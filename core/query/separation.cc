@@ -481,7 +481,7 @@ class SeparationSearch {
     const double largest =
         std::max(witness.p_WA.cwiseAbs().maxCoeff(), witness.p_WB.cwiseAbs().maxCoeff());
     witness.error += 16 * kUnitRoundoff * std::max(radius_a, radius_b) +
-                     4 * kUnitRoundoff * largest + 4 * kLeastDouble;
+                     4 * kUnitRoundoff * largest + 4 * kMinDouble;
     if (std::isfinite(largest)) return;
     for (Vector* const p : {&witness.p_WA, &witness.p_WB}) {
       *p = p->cwiseMax(-kLargestDouble).cwiseMin(kLargestDouble);

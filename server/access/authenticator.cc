@@ -44,10 +44,10 @@ absl::StatusOr<Caller> Authenticator::Authenticate(const Metadata& metadata, Rpc
   const auto [first, last] = metadata.equal_range(kKey);
   if (first == last) {
     return Missing(
-        "the call carries no token; send one as metadata \"authorization: Bearer TOKEN\"");
+        "the call has no token; send one as metadata \"authorization: Bearer TOKEN\"");
   }
   if (std::next(first) != last) {
-    return Missing("the call carries \"authorization\" twice; send one");
+    return Missing("the call has \"authorization\" twice; send one");
   }
   const std::string value(first->second.data(), first->second.size());
   if (!absl::StartsWithIgnoreCase(value, kScheme)) {

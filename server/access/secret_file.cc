@@ -15,7 +15,7 @@
 namespace hulld::server {
 namespace {
 
-constexpr size_t kMostBytes = 1 << 20;
+constexpr size_t kMaxBytes = 1 << 20;
 
 absl::Status Problem(const std::string& setting, const std::string& path, const std::string& what) {
   return absl::InvalidArgumentError(absl::StrCat(setting, " ", path, ": ", what));
@@ -55,7 +55,7 @@ absl::StatusOr<std::string> ReadFile(const std::string& path, const std::string&
     if (count < 0) return failed();
     if (count == 0) return text;
     text.append(buffer, static_cast<size_t>(count));
-    if (text.size() > kMostBytes) return Problem(setting, path, "it is larger than 1 MiB");
+    if (text.size() > kMaxBytes) return Problem(setting, path, "it is larger than 1 MiB");
   }
 }
 

@@ -17,11 +17,11 @@
 namespace hulld::server {
 namespace {
 
-constexpr size_t kMostNameCharacters = 64;
+constexpr size_t kMaxNameCharacters = 64;
 constexpr char kHashScheme[] = "sha256:";
 
 bool IsName(const std::string& text) {
-  return !text.empty() && text.size() <= kMostNameCharacters &&
+  return !text.empty() && text.size() <= kMaxNameCharacters &&
          CheckHullIdSyntax(text, "name").ok() && text.find('/') == std::string::npos;
 }
 

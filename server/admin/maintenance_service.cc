@@ -29,7 +29,7 @@ absl::Status CheckSeesAll(const Caller& caller) {
   if (caller.sees_all()) return absl::OkStatus();
   return WithReason(absl::PermissionDeniedError(absl::StrCat(
                         "token \"", caller.name, "\" is limited to \"", caller.prefix,
-                        "\", and a backup holds the whole store; use a token without a prefix")),
+                        "\", and a backup contains the whole store; use a token without a prefix")),
                     v1::ERROR_REASON_OUTSIDE_PREFIX, {{"prefix", caller.prefix}});
 }
 

@@ -18,7 +18,7 @@ namespace reflection = grpc::reflection::v1alpha;
 using google::protobuf::DescriptorPool;
 using google::protobuf::FileDescriptor;
 
-constexpr size_t kMostRequestBytes = 4096;
+constexpr size_t kMaxRequestBytes = 4096;
 
 // Adds the file, preceded by its dependencies that are not in `added`.
 void AddFile(const FileDescriptor& file, std::set<const FileDescriptor*>& added,
@@ -49,9 +49,9 @@ class ReflectionStream
 
   void OnMessage() override {
     // The reply repeats the request.
-    if (request().ByteSizeLong() > kMostRequestBytes) {
+    if (request().ByteSizeLong() > kMaxRequestBytes) {
       return FinishCall(absl::InvalidArgumentError(
-          absl::StrCat("the request has more than ", kMostRequestBytes, " bytes")));
+          absl::StrCat("the request has more than ", kMaxRequestBytes, " bytes")));
     }
     reply().set_valid_host(request().host());
     *reply().mutable_original_request() = request();

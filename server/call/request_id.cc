@@ -13,14 +13,14 @@
 namespace hulld::server {
 namespace {
 
-constexpr size_t kMostCharacters = 128;
+constexpr size_t kMaxCharacters = 128;
 // The random part has 64 bits.
 constexpr size_t kRandomCharacters = 16;
 
 }  // namespace
 
 bool IsRequestId(const std::string& text) {
-  if (text.empty() || text.size() > kMostCharacters) return false;
+  if (text.empty() || text.size() > kMaxCharacters) return false;
   return std::all_of(text.begin(), text.end(), [](char c) {
     return absl::ascii_isalnum(static_cast<unsigned char>(c)) ||
            std::string_view("-_.:/+=").find(c) != std::string_view::npos;

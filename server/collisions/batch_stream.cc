@@ -12,9 +12,9 @@ namespace {
 // The first pieces are small because the cost of a pair is unknown. The maximum bounds the damage
 // of a wrong estimate.
 constexpr uint64_t kFirstPairs = 128;
-constexpr uint64_t kMostPairs = 1 << 14;
+constexpr uint64_t kMaxPairs = 1 << 14;
 // Decoding and placing this many placements takes about a slice.
-constexpr int kMostPlacementsPerSlice = 4096;
+constexpr int kMaxPlacementsPerSlice = 4096;
 // Pairs between two reads of the clock.
 constexpr uint64_t kPairsPerPoll = 64;
 
@@ -23,8 +23,8 @@ constexpr uint64_t kPairsPerPoll = 64;
 BatchStream::BatchStream(CallContext& context, const CollisionParts& parts, const Bytes& request)
     : PiecedReplies(request, context, Rpc::kBatchCheckCollisions, parts,
                     {.first_units = kFirstPairs,
-                     .most_units = kMostPairs,
-                     .most_short_placements = kMostPlacementsPerSlice,
+                     .max_units = kMaxPairs,
+                     .max_short_placements = kMaxPlacementsPerSlice,
                      .joins_head = true}) {}
 
 absl::Status BatchStream::Validate() {

@@ -22,9 +22,9 @@ namespace {
 // Pairs between two reads of the clock.
 constexpr size_t kPairsPerClaim = 16;
 // Decoding the poses of an update up to this size takes less than a slice.
-constexpr int kMostShortUpdate = 4096;
+constexpr int kMaxShortUpdate = 4096;
 // An update that affects at most this many pairs is answered on arrival.
-constexpr int kMostQuickPairs = 8;
+constexpr int kMaxQuickPairs = 8;
 // A stream is opened for many updates. The number is a guess.
 constexpr uint64_t kExpectedUpdates = 256;
 // An index among the pairs, as a varint.
@@ -49,7 +49,7 @@ void CollisionStream::OnMessage() {
   if (!open_) return RunOn(parts_.long_readers, [this] { Handle(); });
   if (request().update().refresh_hulls()) return RunOn(parts_.readers, [this] { Handle(); });
   // Only the first slice of a step runs ahead of batches.
-  const bool is_short = request().update().placements_size() <= kMostShortUpdate;
+  const bool is_short = request().update().placements_size() <= kMaxShortUpdate;
   if (is_short) return RunOn(parts_.pool, [this] { Handle(); });
   RunOn(lane_, [this] { Handle(); });
 }
@@ -66,12 +66,12 @@ void CollisionStream::OnSent() {
 bool CollisionStream::IsQuick() const {
   if (!open_ || !request().has_update() || !options_.WantsRelationOnly()) return false;
   const v1::CollisionStreamUpdate& update = request().update();
-  if (update.refresh_hulls() || update.placements_size() > kMostQuickPairs) return false;
+  if (update.refresh_hulls() || update.placements_size() > kMaxQuickPairs) return false;
   int pairs = 0;
   for (const uint32_t placement : update.placements()) {
     if (placement >= table_.size()) return true;  // an error
     for (const uint32_t number : pairs_.pairs_of(placement)) {
-      if (++pairs > kMostQuickPairs) return false;
+      if (++pairs > kMaxQuickPairs) return false;
       const LivePair& pair = pairs_.pair(number);
       for (const uint32_t part : {pair.a, pair.b}) {
         if (table_.is_body(part)) return false;

@@ -24,7 +24,7 @@ constexpr uint32_t kA = 0;
 constexpr uint32_t kB = 1;
 // Maximum number of waiting calls that the committing thread answers itself after a store query,
 // instead of dispatching them. 32 queries of about 10 us delay its commits by about a round trip.
-constexpr size_t kMostAnsweredInTurn = 32;
+constexpr size_t kMaxAnsweredInTurn = 32;
 
 // a, b: the deciding hulls; canonical if the answer names vertices.
 absl::Status EncodeAnswer(const hulld::Answer& answer, const QueryHull& a, const QueryHull& b,
@@ -54,7 +54,7 @@ void PairQuestion::Start(const CollisionParts& parts, CheckCall* call) {
   // A store with peer servers is queried first. No thread waits for its reply.
   const auto answer = [question](const absl::Status& status) {
     if (!status.ok()) return question->call_->End(status);
-    const bool may_answer = question->parts_.waiting.count() < kMostAnsweredInTurn;
+    const bool may_answer = question->parts_.waiting.count() < kMaxAnsweredInTurn;
     if (!may_answer || !question->TryAnswer()) question->AnswerLater();
   };
   const bool waits = parts.waiting.AwaitFresh(parts.registry, question->plan_.freshness,

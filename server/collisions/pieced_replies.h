@@ -88,23 +88,23 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
 
   // Unsent bytes above which no slice starts. A choice: several messages, so that the threads need
   // not wait for gRPC's threads.
-  static constexpr size_t kMostUnsentBytes = size_t{4} * Config::kReplyMessageBytes;
+  static constexpr size_t kMaxUnsentBytes = size_t{4} * Config::kReplyMessageBytes;
   // Maximum bytes held by a piece that waits for an earlier one.
-  static constexpr size_t kMostHeldBytes = Config::kReplyMessageBytes / 4;
+  static constexpr size_t kMaxHeldBytes = Config::kReplyMessageBytes / 4;
   // Memory of several hundred placements. --max-concurrent-batches such calls take several MiB.
   static constexpr size_t kSmallBytes = 256 << 10;
   // A reply of at most kSmallReplyBytes is merged with the last queued one, because a write costs
   // each side as much as a hundred pairs. While slices run, a queued reply of at most that size
-  // waits about kMostWait to be merged.
+  // waits about kMaxWait to be merged.
   static constexpr size_t kSmallReplyBytes = 32 << 10;
-  static constexpr std::chrono::milliseconds kMostWait{2};
+  static constexpr std::chrono::milliseconds kMaxWait{2};
 
   struct Shape {
     // Numbers of units in the first piece and in the largest.
     uint64_t first_units;
-    uint64_t most_units;
+    uint64_t max_units;
     // Preparing this many placements takes about a slice, excluding waits.
-    int most_short_placements;
+    int max_short_placements;
     // True if the first answers may join the last message of the head.
     bool joins_head;
   };
@@ -116,7 +116,7 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
         readers_(parts.long_readers),
         lane_(parts.pool),
         waiting_(parts.waiting),
-        most_pieces_(2 * static_cast<size_t>(parts.pool.threads())),
+        max_pieces_(2 * static_cast<size_t>(parts.pool.threads())),
         shape_(shape),
         charge_(parts.registry.memory(), MemoryUse::kReading),
         holds_head_(shape.joins_head),
@@ -158,7 +158,7 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   // long call. Used by the steps above.
   void ShareOut(size_t count, size_t step, const std::function<void(size_t, size_t)>& work) {
     if (IsShort()) return work(0, count);
-    SharedLoop::Run(readers_, most_pieces_ / 2 - 1, count, step, work);
+    SharedLoop::Run(readers_, max_pieces_ / 2 - 1, count, step, work);
   }
 
   // Performs a step on the next unit of the piece, which takes a few microseconds, or until `end`
@@ -221,8 +221,7 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   // Returns true if preparation takes at most about a slice, excluding waits.
   bool IsShort() const {
     const int listed = this->request().placements_size();
-    return listed + this->request().packed_placements().hulls_size() <=
-           shape_.most_short_placements;
+    return listed + this->request().packed_placements().hulls_size() <= shape_.max_short_placements;
   }
 
   // Runs a short call on the pool first: if its hulls are ready, it need not wait for another
@@ -323,7 +322,7 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   bool KeepsWaiting() const final {
     if (holds_head_) return opening_ || running_ > 0;
     return running_ > 0 && this->LastWaitingBytes() <= kSmallReplyBytes &&
-           this->LastWaitingTime() < kMostWait;
+           this->LastWaitingTime() < kMaxWait;
   }
 
   // Queues the next message of the table of hulls, which precedes all answers. Returns true if more
@@ -338,7 +337,7 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   }
 
   void StartWork() final {
-    while (is_head_left_ && this->unsent_bytes() < kMostUnsentBytes) is_head_left_ = QueueHead();
+    while (is_head_left_ && this->unsent_bytes() < kMaxUnsentBytes) is_head_left_ = QueueHead();
     if (opening_) return;
     while (!pieces_.empty() && !pieces_.front()->is_running) {
       Work& front = *pieces_.front();
@@ -349,7 +348,7 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     NoteHeldBytes();
     if (is_head_left_) return;
     if (pieces_.empty() && next_unit_ == unit_count_) unit_count_ += CountFollowingUnits();
-    if (this->unsent_bytes() < kMostUnsentBytes) StartSlices();
+    if (this->unsent_bytes() < kMaxUnsentBytes) StartSlices();
     if (!pieces_.empty() || next_unit_ < unit_count_) return;
     OnAllDelivered();
     this->End(absl::OkStatus());
@@ -365,7 +364,7 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   }
 
   void StartSlices() {
-    while (pieces_.size() < most_pieces_ && next_unit_ < unit_count_) {
+    while (pieces_.size() < max_pieces_ && next_unit_ < unit_count_) {
       auto piece = std::make_unique<Work>();
       piece->next = next_unit_;
       piece->end = std::min(unit_count_, next_unit_ + piece_units_);
@@ -375,7 +374,7 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     for (const std::unique_ptr<Work>& piece : pieces_) {
       if (piece->is_running || piece->is_done()) continue;
       const bool is_front = piece == pieces_.front();
-      if (!is_front && (piece->bytes >= kMostHeldBytes || !MayRunAhead())) continue;
+      if (!is_front && (piece->bytes >= kMaxHeldBytes || !MayRunAhead())) continue;
       piece->is_running = true;
       ++running_;
       this->RunOn(lane_, [this, each = piece.get()] { RunSlice(*each); });
@@ -389,14 +388,14 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
                           std::max<Clock::duration>(piece.elapsed, least);
     const double wanted = static_cast<double>(piece.units) * std::min(factor, 4.0);
     piece_units_ =
-        static_cast<uint64_t>(std::clamp(wanted, 1.0, static_cast<double>(shape_.most_units)));
+        static_cast<uint64_t>(std::clamp(wanted, 1.0, static_cast<double>(shape_.max_units)));
   }
 
   Registry& registry_;
   WorkerPool& readers_;
   TaskPool::Lane lane_;
   WaitingCalls& waiting_;
-  const size_t most_pieces_;
+  const size_t max_pieces_;
   const Shape shape_;
 
   // Owned by the opening thread while the call is being opened.

@@ -17,9 +17,9 @@ namespace {
 // The first pieces are small because the number of candidates is unknown. The maximum bounds the
 // damage of a wrong estimate.
 constexpr uint64_t kFirstPlacements = 4;
-constexpr uint64_t kMostPlacements = 1024;
+constexpr uint64_t kMaxPlacements = 1024;
 // Building the tree of this many placements takes about a slice.
-constexpr int kMostBoxesPerSlice = 512;
+constexpr int kMaxBoxesPerSlice = 512;
 // Candidates, placements, or gathering steps between two reads of the clock; also the nodes per
 // gathering step, which takes about as long as a candidate.
 constexpr uint64_t kStepsPerPoll = 16;
@@ -45,8 +45,8 @@ QueryOptions WithoutDetails(QueryOptions options) {
 SceneStream::SceneStream(CallContext& context, const CollisionParts& parts, const Bytes& request)
     : PiecedReplies(request, context, Rpc::kFindCollisions, parts,
                     {.first_units = kFirstPlacements,
-                     .most_units = kMostPlacements,
-                     .most_short_placements = kMostBoxesPerSlice,
+                     .max_units = kMaxPlacements,
+                     .max_short_placements = kMaxBoxesPerSlice,
                      .joins_head = false}) {}
 
 absl::Status SceneStream::Validate() {

@@ -12,8 +12,8 @@ namespace hulld::server {
 namespace {
 
 // Limits of a transaction: vertices (24 MB), or changes of hulls and bodies. A choice.
-constexpr size_t kMostVertices = 1'000'000;
-constexpr size_t kMostChanges = 1000;
+constexpr size_t kMaxVertices = 1'000'000;
+constexpr size_t kMaxChanges = 1000;
 
 // Changes sent to the target together.
 class Batch {
@@ -26,8 +26,7 @@ class Batch {
       vertices_ += change.vertices.size();
       changes_.push_back(std::move(change));
     }
-    return vertices_ >= kMostVertices || changes_.size() >= kMostChanges ? Flush()
-                                                                         : absl::OkStatus();
+    return vertices_ >= kMaxVertices || changes_.size() >= kMaxChanges ? Flush() : absl::OkStatus();
   }
   absl::Status Flush() {
     if (changes_.empty()) return absl::OkStatus();

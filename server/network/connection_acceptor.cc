@@ -30,7 +30,7 @@ namespace {
 constexpr uint64_t kReservedDescriptors = 256;
 constexpr int kBacklog = 4096;
 // Connections accepted from a listener before the next listener's turn.
-constexpr int kMostAtOnce = 64;
+constexpr int kMaxAtOnce = 64;
 // Maximum wait for gRPC to close evicted connections, so that a stuck connection never stops the
 // acceptor.
 constexpr std::chrono::seconds kLongestWait(1);
@@ -123,10 +123,10 @@ ConnectionAcceptor::ConnectionAcceptor(const ListenAddress& address, ConnectionT
       closed_idle_(metrics.AddCounter("hulld_connections_closed_total",
                                       "Connections closed by the server, by reason.",
                                       {{"reason", "idle"}})) {
-  const uint64_t most = MostDescriptors();
+  const uint64_t most = MaxDescriptors();
   const uint64_t reserved = std::min(kReservedDescriptors, most / 4);
-  first_reserved_ = static_cast<int>(std::min<uint64_t>(most - reserved, kMostGuardedDescriptors));
-  most_closing_ = std::max<uint64_t>(1, reserved / 2);
+  first_reserved_ = static_cast<int>(std::min<uint64_t>(most - reserved, kMaxGuardedDescriptors));
+  max_closing_ = std::max<uint64_t>(1, reserved / 2);
   table_.LimitTo(static_cast<size_t>(std::max(1, first_reserved_)));
   Register(epoll_, wake_.number(), kWake);
 }
@@ -211,7 +211,7 @@ void ConnectionAcceptor::Stop() {
 
 bool ConnectionAcceptor::AwaitRoom() {
   std::unique_lock lock(mutex_);
-  room_.wait_for(lock, kLongestWait, [this] { return stopping_ || closing_ < most_closing_; });
+  room_.wait_for(lock, kLongestWait, [this] { return stopping_ || closing_ < max_closing_; });
   return !stopping_;
 }
 
@@ -230,7 +230,7 @@ void ConnectionAcceptor::Run() {
 }
 
 bool ConnectionAcceptor::AcceptFrom(int listener) {
-  for (int i = 0; i < kMostAtOnce && AwaitRoom(); ++i) {
+  for (int i = 0; i < kMaxAtOnce && AwaitRoom(); ++i) {
     sockaddr_storage name = {};
     socklen_t size = sizeof name;
     Descriptor socket(

@@ -87,7 +87,7 @@ class ConnectionAcceptor {
   // lowest free number, so receiving a reserved one shows that all lower ones are in use.
   int first_reserved_;
   // Maximum number of evicted connections that gRPC has not closed yet.
-  size_t most_closing_;
+  size_t max_closing_;
   std::vector<Descriptor> listeners_;
   Descriptor epoll_;
   Descriptor wake_;

@@ -9,7 +9,7 @@ ConnectionTable::Outcome ConnectionTable::Add(uint64_t id, const std::optional<P
   Outcome outcome;
   if (peer.has_value()) {
     const auto known = networks_.find(peer->Network());
-    if (known != networks_.end() && known->second.connections >= most_of_network_) {
+    if (known != networks_.end() && known->second.connections >= max_per_network_) {
       outcome.evicted = EvictFirst(known->second.idle);
       if (outcome.evicted == 0) return {.refusal = Refusal::kNetwork};
     }

@@ -20,8 +20,8 @@ namespace hulld::server {
 // and are never idle, because their calls cannot be attributed. Thread-safe.
 class ConnectionTable {
  public:
-  ConnectionTable(size_t most, size_t most_of_network)
-      : most_(most), most_of_network_(most_of_network) {}
+  ConnectionTable(size_t most, size_t max_per_network)
+      : most_(most), max_per_network_(max_per_network) {}
 
   enum class Refusal { kNone, kTotal, kNetwork };
   struct Outcome {
@@ -72,7 +72,7 @@ class ConnectionTable {
   void Erase(Connections::iterator connection);
 
   size_t most_;
-  const size_t most_of_network_;
+  const size_t max_per_network_;
   mutable std::mutex mutex_;
   Connections connections_;
   std::map<PeerAddress, uint64_t> by_peer_;

@@ -35,12 +35,12 @@ struct Slot {
   }
 };
 
-std::array<std::atomic<Slot*>, kMostGuardedDescriptors> slots;
+std::array<std::atomic<Slot*>, kMaxGuardedDescriptors> slots;
 std::atomic<size_t> half_open_streams = 0;
 std::array<std::atomic<uint64_t>, FrameGuard::kVerdictCount> closed;
 
 Slot* SlotOf(int descriptor) {
-  if (descriptor < 0 || descriptor >= kMostGuardedDescriptors) return nullptr;
+  if (descriptor < 0 || descriptor >= kMaxGuardedDescriptors) return nullptr;
   return slots[static_cast<size_t>(descriptor)].load(std::memory_order_acquire);
 }
 
@@ -67,7 +67,7 @@ bool Inspect(Slot& slot, const msghdr& message, size_t bytes) {
 
 void GuardSocket(int descriptor, uint64_t connection, const FrameLimits* limits,
                  std::function<void()> on_closed) {
-  HULLD_CHECK(descriptor >= 0 && descriptor < kMostGuardedDescriptors && connection != 0);
+  HULLD_CHECK(descriptor >= 0 && descriptor < kMaxGuardedDescriptors && connection != 0);
   std::atomic<Slot*>& place = slots[static_cast<size_t>(descriptor)];
   Slot* slot = place.load(std::memory_order_acquire);
   if (slot == nullptr) {

@@ -20,12 +20,12 @@ namespace hulld::server {
 // All functions are thread-safe.
 
 // Descriptors from this number on cannot be guarded.
-inline constexpr int kMostGuardedDescriptors = 1 << 20;
+inline constexpr int kMaxGuardedDescriptors = 1 << 20;
 
 // Guards the socket `descriptor` until it is closed or Unguard. limits: null for encrypted bytes,
 // which are not inspected. on_closed: called once, right after the close, on the closing thread;
 // it may not call the functions below. Requires: no thread reads from the socket yet, and 0 <=
-// descriptor < kMostGuardedDescriptors. connection: unique, not 0.
+// descriptor < kMaxGuardedDescriptors. connection: unique, not 0.
 void GuardSocket(int descriptor, uint64_t connection, const FrameLimits* limits,
                  std::function<void()> on_closed);
 

@@ -24,7 +24,7 @@ uint64_t CountDescriptors() {
   return count - 1;
 }
 
-uint64_t MostDescriptors() {
+uint64_t MaxDescriptors() {
   rlimit limit = {};
   getrlimit(RLIMIT_NOFILE, &limit);
   return limit.rlim_cur;

@@ -29,7 +29,7 @@ class Descriptor {
 uint64_t CountDescriptors();
 
 // Returns the limit on open descriptors.
-uint64_t MostDescriptors();
+uint64_t MaxDescriptors();
 
 // Raises that limit to the hard limit.
 void RaiseDescriptorLimit();

@@ -130,7 +130,7 @@ void Metrics::AddProcess() {
       .Add({})
       .SetToCurrentTime();
   AddGauge("process_max_fds", "Maximum number of open file descriptors of the process.",
-           [] { return static_cast<double>(MostDescriptors()); });
+           [] { return static_cast<double>(MaxDescriptors()); });
   AddGauge("process_resident_memory_bytes", "Resident memory of the process.",
            [] { return static_cast<double>(ReadResidentMemory().bytes); });
   AddCounter("process_cpu_seconds_total", "Processor time of the process.", {}, ProcessorSeconds);
@@ -166,7 +166,7 @@ void Metrics::CountToken(const std::string& token) {
   const std::lock_guard lock(tokens_mutex_);
   auto known = tokens_.find(token);
   if (known == tokens_.end()) {
-    const std::string name = tokens_.size() < kMostTokens ? token : "other";
+    const std::string name = tokens_.size() < kMaxTokens ? token : "other";
     prometheus::Counter& counter = token_calls_.Add({{"token", name}});
     if (name != token) return counter.Increment();
     known = tokens_.emplace(token, &counter).first;

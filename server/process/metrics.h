@@ -60,10 +60,10 @@ class Metrics : public prometheus::Collectable {
   void CountLimit(const std::string& limit);
   // hulld_auth_failures_total: the reason is "unauthenticated" or "permission_denied".
   void CountAuthFailure(const std::string& reason);
-  // hulld_token_requests_total{token}: ignores the empty name. Beyond kMostTokens names, further
+  // hulld_token_requests_total{token}: ignores the empty name. Beyond kMaxTokens names, further
   // ones count as "other", because a file may contain any number of tokens.
   void CountToken(const std::string& token);
-  static constexpr size_t kMostTokens = 100;
+  static constexpr size_t kMaxTokens = 100;
   // hulld_points_received_total, _kept_, _duplicate_ and _inside_total, of a committed chunk.
   void CountPoints(const PointCounts& counts);
   // hulld_pairs_total{rung}, hulld_exact_fallbacks_total.

@@ -27,8 +27,8 @@ using tcp = boost::asio::ip::tcp;
 
 constexpr char kFlag[] = "--metrics-address";
 // Enough for a few scrapers and manual queries; further connections are closed immediately.
-constexpr size_t kMostConnections = 64;
-constexpr uint32_t kMostHeaderBytes = 8 << 10;
+constexpr size_t kMaxConnections = 64;
+constexpr uint32_t kMaxHeaderBytes = 8 << 10;
 // Timeout for receiving a request, and for sending its reply.
 constexpr std::chrono::seconds kTimeout{20};
 // Pause after running out of descriptors.
@@ -47,7 +47,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
 
   void Read() {
     parser_.emplace();
-    parser_->header_limit(kMostHeaderBytes);
+    parser_->header_limit(kMaxHeaderBytes);
     parser_->body_limit(0);
     stream_.expires_after(kTimeout);
     http::async_read(stream_, buffer_, *parser_,
@@ -90,7 +90,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
   beast::tcp_stream stream_;
   const Metrics& metrics_;
   size_t& connections_;
-  beast::flat_buffer buffer_{kMostHeaderBytes};
+  beast::flat_buffer buffer_{kMaxHeaderBytes};
   std::optional<http::request_parser<http::empty_body>> parser_;
   http::response<http::string_body> response_;
 };
@@ -130,7 +130,7 @@ class MetricsEndpoint::Listener {
         pause_.expires_after(kAcceptPause);
         return pause_.async_wait([this](error_code) { Accept(); });
       }
-      if (connections_ < kMostConnections) {
+      if (connections_ < kMaxConnections) {
         std::make_shared<Connection>(std::move(socket), metrics_, connections_)->Read();
       }
       Accept();

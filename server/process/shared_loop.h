@@ -24,12 +24,12 @@ class SharedLoop {
   // Starts to run `work` on disjoint ranges that cover [0, count), on up to `most_helpers` free
   // threads of a pool, without blocking. Finish must follow; `work` is not called after it.
   // Requires step > 0.
-  static std::shared_ptr<SharedLoop> Start(WorkerPool& helpers, size_t most_helpers, size_t count,
+  static std::shared_ptr<SharedLoop> Start(WorkerPool& helpers, size_t max_helpers, size_t count,
                                            size_t step, Work work) {
     HULLD_CHECK(step > 0);
     const auto loop = std::make_shared<SharedLoop>(count, step, std::move(work));
     const size_t steps = (count + step - 1) / step;
-    for (size_t i = 1; i < steps && i <= most_helpers; ++i) {
+    for (size_t i = 1; i < steps && i <= max_helpers; ++i) {
       helpers.Submit([loop] { loop->TakePart({}); });
     }
     return loop;
@@ -44,8 +44,8 @@ class SharedLoop {
     while (done_ < count_) all_done_.wait(lock);
   }
 
-  static void Run(WorkerPool& helpers, size_t most_helpers, size_t count, size_t step, Work work) {
-    Start(helpers, most_helpers, count, step, std::move(work))->Finish({});
+  static void Run(WorkerPool& helpers, size_t max_helpers, size_t count, size_t step, Work work) {
+    Start(helpers, max_helpers, count, step, std::move(work))->Finish({});
   }
 
   // For Start.

@@ -63,7 +63,7 @@ namespace hulld::server {
 // each wait.
 //
 // One mutex (RegistryState::mutex) guards the state of all parts and is held only briefly
-// (kMostLookupsPerHold). Passing a Locked proves that it is held.
+// (kMaxLookupsPerHold). Passing a Locked proves that it is held.
 //
 // Lock order: this mutex first; then the mutex of the committer's queue, of the budget, of a pool,
 // or of a LiveHull. No other lock is acquired while one of the latter is held. Callbacks run
@@ -147,7 +147,7 @@ class Registry {
   // plan's freshness. May read the store and prepare hulls, so it must not run on a gRPC thread.
   // CANCELLED: should_stop returned true. FAILED_PRECONDITION, UNAVAILABLE: as AwaitFresh.
   // RESOURCE_EXHAUSTED: hulls must be read from the store, or there are more than
-  // kMostLookupsPerHold, while readers exceed their share of --memory-limit; without a retry delay
+  // kMaxLookupsPerHold, while readers exceed their share of --memory-limit; without a retry delay
   // if these hulls account for most of it.
   absl::StatusOr<Resolved> Resolve(std::span<const std::string> ids,
                                    const std::function<bool()>& should_stop,

@@ -30,7 +30,7 @@ constexpr uint64_t kMaxGrpcMessageBytes = std::numeric_limits<int32_t>::max();
 
 constexpr uint64_t kAnyNumber = std::numeric_limits<uint64_t>::max();
 // Minimum --memory-limit: one message of the default maximum size.
-constexpr uint64_t kLeastMemory = 16 << 20;
+constexpr uint64_t kMinMemory = 16 << 20;
 constexpr char kVariablePrefix[] = "HULLD_";
 
 std::string EnvironmentName(std::string flag) {
@@ -403,7 +403,7 @@ class Parser {
         "Memory for hulls, points in flight, replacements in progress, and the placements, pairs, "
         "and answers of batches, scenes, and streams. Excludes the messages of calls and the "
         "store's own buffers. 0: half of the memory of the machine or the control group",
-        kAnyNumber, kLeastMemory);
+        kAnyNumber, kMinMemory);
     AddSize("request-memory", limits.request_memory,
             "Memory for requests in flight, and as much again for requests that are being received",
             kAnyNumber, 1);

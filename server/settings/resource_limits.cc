@@ -23,7 +23,7 @@ using GroupLimit = std::function<uint64_t(const fs::path& directory)>;
 
 // In a container, the path may be the host's. Then only the root exists, and it is the container's
 // own group.
-uint64_t LeastAlong(const fs::path& mount, const std::string& group, const GroupLimit& limit) {
+uint64_t MinAlong(const fs::path& mount, const std::string& group, const GroupLimit& limit) {
   uint64_t least = limit(mount);
   fs::path path = mount;
   for (const fs::path& part : fs::path(group).lexically_normal().relative_path()) {
@@ -37,8 +37,8 @@ uint64_t LeastAlong(const fs::path& mount, const std::string& group, const Group
 // bind the process; of versions 1 and 2. controller: its name in version 1, as in "memory". A line
 // is hierarchy:controllers:group; version 2 is the hierarchy 0, without controllers. Source:
 // cgroups(7).
-uint64_t LeastGroupLimit(const fs::path& root, const std::string& controller,
-                         const GroupLimit& version_2, const GroupLimit& version_1) {
+uint64_t MinGroupLimit(const fs::path& root, const std::string& controller,
+                       const GroupLimit& version_2, const GroupLimit& version_1) {
   const fs::path mount = root / "sys/fs/cgroup";
   uint64_t least = std::min(version_2(mount), version_1(mount / controller));
   std::ifstream groups(root / "proc/self/cgroup");
@@ -47,9 +47,9 @@ uint64_t LeastGroupLimit(const fs::path& root, const std::string& controller,
     if (parts.size() < 3) continue;
     const std::vector<std::string> controllers = absl::StrSplit(parts[1], ',');
     if (parts[1].empty()) {
-      least = std::min(least, LeastAlong(mount, parts[2], version_2));
+      least = std::min(least, MinAlong(mount, parts[2], version_2));
     } else if (std::ranges::find(controllers, controller) != controllers.end()) {
-      least = std::min(least, LeastAlong(mount / controller, parts[2], version_1));
+      least = std::min(least, MinAlong(mount / controller, parts[2], version_1));
     }
   }
   return least;
@@ -106,7 +106,7 @@ CpuLimit ReadCpuLimit(const fs::path& root) {
   CpuLimit limit;
   // The C library counts the processors of the affinity.
   limit.processors = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-  const uint64_t thousandths = LeastGroupLimit(root, "cpu", ReadCpuMax, ReadCfsQuota);
+  const uint64_t thousandths = MinGroupLimit(root, "cpu", ReadCpuMax, ReadCfsQuota);
   if (thousandths != kNoGroupLimit) limit.quota = 0.001 * static_cast<double>(thousandths);
   return limit;
 }
@@ -117,7 +117,7 @@ int DefaultThreads() {
 }
 
 uint64_t ControlGroupMemory(const fs::path& root) {
-  return LeastGroupLimit(root, "memory", NumberIn("memory.max"), NumberIn("memory.limit_in_bytes"));
+  return MinGroupLimit(root, "memory", NumberIn("memory.max"), NumberIn("memory.limit_in_bytes"));
 }
 
 uint64_t DefaultMemoryLimit() {

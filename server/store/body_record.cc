@@ -45,9 +45,9 @@ class Reader {
   std::string NextText() { return std::string(NextBytes(Next<uint64_t>())); }
   // Reads a number of entries of at least this many bytes each; 0, and not ok(), if the remaining
   // bytes are too few.
-  uint64_t NextCount(size_t least_bytes) {
+  uint64_t NextCount(size_t min_bytes) {
     const uint64_t count = Next<uint64_t>();
-    ok_ = ok_ && count <= rest_.size() / least_bytes;
+    ok_ = ok_ && count <= rest_.size() / min_bytes;
     return ok_ ? count : 0;
   }
   bool ok() const { return ok_; }

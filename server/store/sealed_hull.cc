@@ -60,7 +60,7 @@ absl::Status VertexAssembly::Check() const {
   const VertexLayout& layout = hull_.layout;
   if (base_vertices_ != layout.base_vertices) {
     return absl::DataLossError(
-        absl::StrCat("its base holds ", base_vertices_, " vertices, not ", layout.base_vertices));
+        absl::StrCat("its base has ", base_vertices_, " vertices, not ", layout.base_vertices));
   }
   const uint64_t delta_vertices = vertices_.size() - base_vertices_;
   if (deltas_ == layout.delta_count && delta_vertices == layout.delta_vertices) {

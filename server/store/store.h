@@ -172,13 +172,13 @@ class Store {
     return absl::UnimplementedError("this store does not support record lookups");
   }
   // Returns up to `most` records of these kinds in byte order, with IDs that start with `prefix`
-  // and follow `after`. Returns fewer, but at least one, if they exceed kMostListedBytes.
+  // and follow `after`. Returns fewer, but at least one, if they exceed kMaxListedBytes.
   virtual absl::StatusOr<FoundRecords> ListRecords(const std::string& /*prefix*/,
                                                    const std::string& /*after*/, size_t /*most*/,
                                                    RecordKinds /*kinds*/) {
     return absl::UnimplementedError("this store does not support record lookups");
   }
-  static constexpr uint64_t kMostListedBytes = 16 << 20;
+  static constexpr uint64_t kMaxListedBytes = 16 << 20;
   // Totals at revision(), if finds_records(). Not concurrent with Commit.
   virtual StoreTotals totals() const { return {}; }
 

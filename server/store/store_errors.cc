@@ -21,7 +21,7 @@ bool SaysDiskFull(const rocksdb::Status& status) {
 
 absl::Status DiskFull(const std::string& cause, const std::string& data_dir) {
   return WithReason(absl::ResourceExhaustedError(absl::StrCat(
-                        "the disk that holds --data-dir ", data_dir, " is full (", cause,
+                        "the disk that contains --data-dir ", data_dir, " is full (", cause,
                         "); nothing was changed; delete hulls or free disk space, then retry; no "
                         "restart is needed")),
                     v1::ERROR_REASON_DISK_FULL);

@@ -41,11 +41,11 @@ absl::StatusOr<std::vector<Vector>> DecodePoints(const Coordinates& coordinates,
                                                  uint64_t max_points) {
   if (coordinates.size() % 3 != 0) {
     return absl::InvalidArgumentError(
-        absl::StrCat(field, " holds ", coordinates.size(), " numbers; each point needs three"));
+        absl::StrCat(field, " has ", coordinates.size(), " numbers; each point needs three"));
   }
   const size_t count = coordinates.size() / 3;
   if (count > max_points) {
-    return LimitExceeded(absl::StrCat("message holds ", count, " points"), max_points,
+    return LimitExceeded(absl::StrCat("message contains ", count, " points"), max_points,
                          "max-points-per-chunk");
   }
   return ToPoints(coordinates);
@@ -63,13 +63,13 @@ absl::StatusOr<std::chrono::nanoseconds> DecodeStaleness(
     const google::protobuf::Duration& message) {
   constexpr int64_t kNanosPerSecond = 1'000'000'000;
   // Far longer than any server runs, yet far below an overflow.
-  constexpr int64_t kMostSeconds = kNanosPerSecond;
+  constexpr int64_t kMaxSeconds = kNanosPerSecond;
   if (message.seconds() < 0 || message.nanos() < 0 || message.nanos() >= kNanosPerSecond) {
     return absl::InvalidArgumentError(
         absl::StrCat("freshness.max_staleness is ", message.seconds(), " s and ", message.nanos(),
                      " ns; it must be at least 0, with nanos below 10^9"));
   }
-  if (message.seconds() >= kMostSeconds) return std::chrono::seconds(kMostSeconds);
+  if (message.seconds() >= kMaxSeconds) return std::chrono::seconds(kMaxSeconds);
   return std::chrono::seconds(message.seconds()) + std::chrono::nanoseconds(message.nanos());
 }
 
@@ -92,7 +92,7 @@ absl::Status CheckShape(std::span<const Vector> points) {
   }
   if (points.size() > Config::kMaxShapePoints) {
     return absl::InvalidArgumentError(absl::StrCat(
-        "points holds ", points.size(), " points; the limit of an inline shape is ",
+        "points has ", points.size(), " points; the limit of an inline shape is ",
         Config::kMaxShapePoints, "; give only the vertices of the hull, or register it"));
   }
   for (size_t i = 0; i < points.size(); ++i) {

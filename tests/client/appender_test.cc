@@ -106,7 +106,7 @@ TEST_F(AppenderTest, ChunksAreSentAheadOfTheirAcksUpToTheBound) {
     EXPECT_LT(appender->totals().points_sent - appender->totals().points_acknowledged, 3u);
   }
   ASSERT_TRUE(appender->Finish().ok());
-  EXPECT_EQ(fake_.most_unacknowledged(), 3);
+  EXPECT_EQ(fake_.max_unacknowledged(), 3);
   EXPECT_EQ(FirstCoordinates().size(), 21u);
 }
 
@@ -117,7 +117,7 @@ TEST_F(AppenderTest, BytesInFlightAreBoundedToo) {
     ASSERT_TRUE(appender->Append(Block(i)).ok());
     EXPECT_EQ(appender->totals().points_acknowledged, static_cast<uint64_t>(i + 1));
   }
-  EXPECT_EQ(fake_.most_unacknowledged(), 1);
+  EXPECT_EQ(fake_.max_unacknowledged(), 1);
   ASSERT_TRUE(appender->Finish().ok());
 }
 

@@ -85,7 +85,7 @@ class FakeHulld::Hulls final : public v1::HullService::Service {
       }
       {
         const std::lock_guard lock(fake_.mutex_);
-        fake_.most_unacknowledged_ = std::max(fake_.most_unacknowledged_, ++unacknowledged);
+        fake_.max_unacknowledged_ = std::max(fake_.max_unacknowledged_, ++unacknowledged);
         fake_.changed_.notify_all();
       }
       if (script.hold_acks) {
@@ -401,9 +401,9 @@ void FakeHulld::RemoveHull(const std::string& hull_id) {
   hulls_.erase(hull_id);
 }
 
-int FakeHulld::most_unacknowledged() {
+int FakeHulld::max_unacknowledged() {
   const std::lock_guard lock(mutex_);
-  return most_unacknowledged_;
+  return max_unacknowledged_;
 }
 
 v1::CheckCollisionRequest FakeHulld::last_collision_request() {

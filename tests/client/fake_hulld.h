@@ -73,7 +73,7 @@ class FakeHulld final {
   void PutHull(const std::string& hull_id, FakeHull hull);
   void RemoveHull(const std::string& hull_id);
   // Returns the maximum number of unacknowledged chunks of any stream.
-  int most_unacknowledged();
+  int max_unacknowledged();
 
   // Override the parts of every mesh and the relations of every batch.
   std::vector<v1::GetHullMeshResponse> mesh_parts;
@@ -102,7 +102,7 @@ class FakeHulld final {
   std::deque<StreamScript> scripts_;
   std::map<std::string, FakeHull> hulls_;
   uint64_t revision_ = 0;
-  int most_unacknowledged_ = 0;
+  int max_unacknowledged_ = 0;
   v1::CheckCollisionRequest last_collision_request_;
   std::vector<v1::BatchCheckCollisionsRequest> batch_requests_;
   std::vector<v1::ListHullsRequest> list_requests_;

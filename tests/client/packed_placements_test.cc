@@ -188,18 +188,18 @@ TEST_F(Packed, ErrorsNameTheList) {
   packed->add_hull_ids("cube");
   packed->add_hulls(0);
   EXPECT_THAT(BatchError(request),
-              HasSubstr("packed_placements.poses holds 0 numbers for 1 placements"));
+              HasSubstr("packed_placements.poses has 0 numbers for 1 placements"));
   for (int i = 0; i < 8; ++i) packed->add_poses(1);
-  EXPECT_THAT(BatchError(request), HasSubstr("poses holds 8 numbers for 1 placements"));
+  EXPECT_THAT(BatchError(request), HasSubstr("poses has 8 numbers for 1 placements"));
   packed->mutable_poses()->RemoveLast();
   packed->set_hulls(0, 1);
   EXPECT_THAT(BatchError(request),
-              HasSubstr("packed_placements.hulls[0] is 1, but packed_placements.hull_ids holds 1"));
+              HasSubstr("packed_placements.hulls[0] is 1, but packed_placements.hull_ids has 1"));
   packed->set_hulls(0, 0);
   packed->add_radii(1);
   packed->add_radii(1);
   EXPECT_THAT(BatchError(request),
-              HasSubstr("packed_placements.radii holds 2 numbers for 1 placements"));
+              HasSubstr("packed_placements.radii has 2 numbers for 1 placements"));
   packed->clear_radii();
   *request.add_placements() = PlacementOf("cube");
   EXPECT_THAT(BatchError(request), HasSubstr("both set"));

@@ -18,13 +18,12 @@ Integer Gap(const IntegerVector& n, const WorldPoints& points) {
   return start - reach;
 }
 
-std::string DirectionFault(const Certificate& certificate, int least_gap,
-                           const WorldPoints& points) {
+std::string DirectionFault(const Certificate& certificate, int min_gap, const WorldPoints& points) {
   if (certificate.direction.size() != 3) return "no direction";
   const IntegerVector n = {certificate.direction[0], certificate.direction[1],
                            certificate.direction[2]};
   if (IsZero(n)) return "the direction is zero";
-  return Sign(Gap(n, points)) >= least_gap ? "" : "the direction does not separate";
+  return Sign(Gap(n, points)) >= min_gap ? "" : "the direction does not separate";
 }
 
 }  // namespace

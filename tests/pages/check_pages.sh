@@ -10,7 +10,7 @@ programs=$(cd "$1" && pwd) || exit 2
 cd "$(dirname "${BASH_SOURCE[0]}")/../.." || exit 2
 export LC_ALL=C
 
-readonly most_readme_bytes=14336
+readonly max_readme_bytes=14336
 problems=0
 problem() {
   echo "$*"
@@ -87,7 +87,7 @@ for page in $(pages); do
 done
 
 bytes=$(wc -c <README.md)
-((bytes <= most_readme_bytes)) || problem "README.md holds $bytes bytes; $most_readme_bytes are enough"
+((bytes <= max_readme_bytes)) || problem "README.md has $bytes bytes; the limit is $max_readme_bytes"
 
 mapfile -t flags < <("$programs/hulld" --help | grep -oE '^  (-[a-z],)?--[a-z-]+' | grep -oE -- '--[a-z-]+')
 ((${#flags[@]} > 20)) || problem "hulld --help names no flags"

@@ -178,7 +178,7 @@ TEST_F(FreshReads, QueriesThatWaitForTheStoreEndWhenCancelled) {
 
 // Queries that wait without a thread count as those that wait for one.
 TEST_F(FreshReads, QueriesThatWaitForTheStoreAreBounded) {
-  constexpr int kMost = 8;
+  constexpr int kMax = 8;
   constexpr int kSent = 200;
   constexpr size_t kSurelyRefused = 40;
   Append(0, "h", 1);
@@ -191,7 +191,7 @@ TEST_F(FreshReads, QueriesThatWaitForTheStoreAreBounded) {
                                           "--postgres-servers",
                                           "many",
                                           "--max-waiting-calls",
-                                          absl::StrCat(kMost)};
+                                          absl::StrCat(kMax)};
   Process server(words);
   const auto channel = grpc::CreateChannel(AddressIn(server.ReadLineWith("listening on ")),
                                            grpc::InsecureChannelCredentials());
@@ -246,7 +246,7 @@ TEST_F(FreshReads, QueriesThatWaitForTheStoreAreBounded) {
     // The waiting calls are answered and make room for new ones.
     holder.reset();
     while (ended < calls.size()) end_one();
-    EXPECT_GE(others, kMost);
+    EXPECT_GE(others, kMax);
     const auto answered = std::ranges::count_if(calls, [](const Call& c) { return c.status.ok(); });
     EXPECT_EQ(others, answered);
     Call last;

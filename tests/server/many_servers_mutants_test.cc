@@ -14,10 +14,10 @@ class ManyServersMutants : public ManyServersTest {
  protected:
   // Requires mutants/NAME.patch for the test of this name.
   void ExpectFound() {
-    constexpr uint64_t kMost = 60;
+    constexpr uint64_t kMax = 60;
     const std::string name = ::testing::UnitTest::GetInstance()->current_test_info()->name();
     UseProgram(HULLD_MUTANTS "/" + name + "/hulld");
-    for (uint64_t seed = 0; seed < kMost && !HasFailure(); ++seed) {
+    for (uint64_t seed = 0; seed < kMax && !HasFailure(); ++seed) {
       Begin();
       HullHistory history;
       Run({.each = 60,

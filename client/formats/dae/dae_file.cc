@@ -25,9 +25,9 @@ using pugi::xml_node;
 using Vector = std::array<double, 3>;
 
 // Limits for files whose nodes instantiate each other very many times.
-constexpr int kMostLevels = 256;
-constexpr size_t kMostElements = size_t{1} << 20;
-constexpr size_t kMostCorners = size_t{1} << 28;
+constexpr int kMaxLevels = 256;
+constexpr size_t kMaxElements = size_t{1} << 20;
+constexpr size_t kMaxCorners = size_t{1} << 28;
 
 constexpr std::array<LengthScale, 3> kUnscaled = {};
 
@@ -115,8 +115,8 @@ class DaeWalk {
   // Visits a node, or the nodes of a visual scene.
   void VisitNode(xml_node node, const Affine& X_WP, int level) {
     if (!ok()) return;
-    if (level > kMostLevels) {
-      return Fail(node, absl::StrCat("is nested deeper than ", kMostLevels,
+    if (level > kMaxLevels) {
+      return Fail(node, absl::StrCat("is nested deeper than ", kMaxLevels,
                                      " levels; does it show itself?"));
     }
     const size_t number = ++number_;
@@ -125,8 +125,8 @@ class DaeWalk {
       if (ok()) X_WN = X_WN * TransformOf(child);
     }
     for (const xml_node child : node.children()) {
-      if (++elements_ > kMostElements) {
-        Fail(node, absl::StrCat("is shown too often, with others: more than ", kMostElements,
+      if (++elements_ > kMaxElements) {
+        Fail(node, absl::StrCat("is shown too often, with others: more than ", kMaxElements,
                                 " elements"));
       }
       if (!ok()) return;
@@ -154,8 +154,8 @@ class DaeWalk {
     if (is_new) mesh = ReadDaeMesh(geometry, is_moved ? kUnscaled : scale_, &document_);
     vertices_ += mesh.vertices.size();
     corners_ += mesh.vertices.size() + 3 * mesh.triangles.size();
-    if (corners_ > kMostCorners) {
-      Fail(node, absl::StrCat("is shown too often, with others: more than ", kMostCorners,
+    if (corners_ > kMaxCorners) {
+      Fail(node, absl::StrCat("is shown too often, with others: more than ", kMaxCorners,
                               " vertices and corners of triangles"));
     }
     if (!ok()) return;

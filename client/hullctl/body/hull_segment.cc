@@ -6,12 +6,12 @@
 namespace hulld {
 namespace {
 
-constexpr size_t kMostNameBytes = 100;
+constexpr size_t kMaxNameBytes = 100;
 
 }  // namespace
 
 std::string HullSegment(std::string name) {
-  if (name.size() > kMostNameBytes) name.resize(kMostNameBytes);
+  if (name.size() > kMaxNameBytes) name.resize(kMaxNameBytes);
   for (char& c : name) {
     const bool allowed =
         absl::ascii_isalnum(static_cast<unsigned char>(c)) || c == '.' || c == '_' || c == '-';

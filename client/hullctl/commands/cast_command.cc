@@ -54,10 +54,10 @@ Triple NumbersOf(const v1::SeparatedInterval& interval) {
     return {n.x(), n.y(), n.z()};
   }
   // The range of a double is 308 digits.
-  constexpr size_t kMostDigits = 300;
+  constexpr size_t kMaxDigits = 300;
   const v1::IntegerDirection& n = interval.integer_direction();
   const size_t longest = std::max({n.x().size(), n.y().size(), n.z().size()});
-  const size_t dropped = longest > kMostDigits ? longest - kMostDigits : 0;
+  const size_t dropped = longest > kMaxDigits ? longest - kMaxDigits : 0;
   return {Leading(n.x(), dropped), Leading(n.y(), dropped), Leading(n.z(), dropped)};
 }
 

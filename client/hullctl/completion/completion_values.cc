@@ -17,9 +17,9 @@ namespace {
 // Bounds the delay for an interactive user.
 constexpr std::chrono::milliseconds kPatience(500);
 // Maximum number of listed IDs, to keep within that delay.
-constexpr uint64_t kMostListed = 20000;
+constexpr uint64_t kMaxListed = 20000;
 // Longer lists are abbreviated to ID segments, as they exceed a screen.
-constexpr size_t kMostShown = 100;
+constexpr size_t kMaxShown = 100;
 
 std::vector<Candidate> Contexts(const std::string& start) {
   const auto file = ReadContextFile();
@@ -41,7 +41,7 @@ std::vector<Candidate> Things(Invocation* invocation, ValueKind kind, const std:
   std::vector<Candidate> candidates;
   bool many = false;
   if (kind != ValueKind::kBody) {
-    const auto hulls = client.ListAllHulls(start, kMostListed);
+    const auto hulls = client.ListAllHulls(start, kMaxListed);
     if (!hulls.ok()) return {};
     for (const v1::HullInfo& hull : hulls->hulls()) {
       candidates.push_back({hull.hull_id(), absl::StrCat(hull.vertex_count(), " vertices")});
@@ -49,7 +49,7 @@ std::vector<Candidate> Things(Invocation* invocation, ValueKind kind, const std:
     many = !hulls->next_page_token().empty();
   }
   if (kind != ValueKind::kHull) {
-    const auto bodies = client.ListAllBodies(start, kMostListed);
+    const auto bodies = client.ListAllBodies(start, kMaxListed);
     if (!bodies.ok()) return {};
     for (const v1::BodyInfo& body : bodies->bodies()) {
       const char* const pieces = body.piece_count() == 1 ? " piece" : " pieces";
@@ -63,7 +63,7 @@ std::vector<Candidate> Things(Invocation* invocation, ValueKind kind, const std:
   for (const Candidate& candidate : candidates) {
     parts.insert(candidate.text.substr(0, candidate.text.find('/', start.size()) + 1));
   }
-  many = many || candidates.size() > kMostShown;
+  many = many || candidates.size() > kMaxShown;
   // An ID without a further "/" has no segment.
   if (!many || parts.contains("")) return candidates;
   candidates.clear();

@@ -43,7 +43,7 @@ inline constexpr ConnectionSetting kConnectionSettings[] = {
     {"server-name", "HULLCTL_SERVER_NAME", SettingKind::kText, "NAME",
      "Name in the server's certificate, if it differs from --server"},
     {"token-file", "HULLCTL_TOKEN_FILE", SettingKind::kFile, "FILE",
-     "File of the token; $HULLD_TOKEN holds the token itself"},
+     "File of the token; $HULLD_TOKEN contains the token itself"},
     {"insecure", nullptr, SettingKind::kFlag, nullptr,
      "Allow sending the token unencrypted to other machines"},
 };

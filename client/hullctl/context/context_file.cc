@@ -26,7 +26,7 @@ using google::protobuf::Struct;
 using google::protobuf::Value;
 
 // Maximum size of a context file; a larger file is not a context file.
-constexpr size_t kMostContextBytes = size_t{1} << 20;
+constexpr size_t kMaxContextBytes = size_t{1} << 20;
 
 absl::Status Damaged(const std::string& path, const std::string& what) {
   return absl::InvalidArgumentError(
@@ -120,10 +120,10 @@ absl::StatusOr<ContextFile> ReadContextFile() {
     return Damaged(path,
                    absl::StrCat("cannot be read: ", std::strerror(errno != 0 ? errno : EISDIR)));
   }
-  std::string text(kMostContextBytes + 1, '\0');
+  std::string text(kMaxContextBytes + 1, '\0');
   stream.read(text.data(), static_cast<std::streamsize>(text.size()));
   text.resize(static_cast<size_t>(stream.gcount()));
-  if (text.size() > kMostContextBytes) return Damaged(path, "the file is too large");
+  if (text.size() > kMaxContextBytes) return Damaged(path, "the file is too large");
   Struct json;
   if (const absl::Status parsed = ParseJson(text, UnknownFields::kRefuse, &json); !parsed.ok()) {
     const std::string message(parsed.message().data(), parsed.message().size());

@@ -13,7 +13,7 @@ namespace {
 // Number of distinct requests per client, created before the clock starts and used in turn.
 constexpr size_t kDistinctRequests = 256;
 // Maximum number of placements per batch: a scene with parts that meet repeatedly.
-constexpr uint64_t kMostPlacements = 256;
+constexpr uint64_t kMaxPlacements = 256;
 // Half the edge of the cube that contains the placed hulls of radius 1: about one pair in three
 // collides.
 constexpr double kHalfRoom = 1.3;
@@ -68,7 +68,7 @@ class LoadSubjects::LoadClient {
       }
     }
     if (Asks(LoadMode::kBatch)) {
-      const uint64_t placements = std::min(kMostPlacements, 2 * settings_.pairs);
+      const uint64_t placements = std::min(kMaxPlacements, 2 * settings_.pairs);
       for (uint64_t i = 0; i < placements; ++i) {
         FillPlacement(hull(), random_, batch_.add_placements());
       }

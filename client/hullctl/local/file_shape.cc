@@ -78,7 +78,7 @@ absl::Status ReadVertices(const ReadRequest& request, v1::PointBlock* points) {
   const auto hulls = Build({FeedOf(request)});
   if (!hulls.ok()) {
     return absl::Status(hulls.status().code(),
-                        absl::StrCat(request.path, " holds more than ", kMaxShapePoints,
+                        absl::StrCat(request.path, " has more than ", kMaxShapePoints,
                                      " points, so a local server has to find the vertices: ",
                                      hulls.status().message()));
   }

@@ -156,7 +156,7 @@ class TableReader {
     for (const char* name : {"a", "b"}) {
       if (!Has(name)) {
         return absl::InvalidArgumentError(absl::StrCat(
-            "the header has no column ", name, ", which holds an ID or a file for each row"));
+            "the header has no column ", name, ", which contains an ID or a file for each row"));
       }
       for (const std::string& first : {absl::StrCat(name, "_q"), absl::StrCat(name, "_to_q")}) {
         const auto given = std::count_if(columns_.begin(), columns_.end(), [&](const auto& column) {

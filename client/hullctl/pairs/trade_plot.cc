@@ -13,10 +13,10 @@ namespace hulld {
 namespace {
 
 // Zero has no logarithm; it is drawn as the rounding of a double.
-constexpr double kLeastError = 1e-17;
+constexpr double kMinError = 1e-17;
 
 std::string Row(const TradePoint& point) {
-  return absl::StrFormat("%.17g %.17g\n", point.microseconds, std::max(point.error, kLeastError));
+  return absl::StrFormat("%.17g %.17g\n", point.microseconds, std::max(point.error, kMinError));
 }
 
 std::string ScriptOf(const TradePlot& plot, const std::string& path) {

@@ -10,7 +10,7 @@
 namespace hulld {
 namespace {
 
-constexpr off_t kMostSwellBytes = off_t{64} << 20;
+constexpr off_t kMaxSwellBytes = off_t{64} << 20;
 
 }  // namespace
 
@@ -36,7 +36,7 @@ std::optional<TriangleMesh> MeshOf(const std::vector<ReadRequest>& files) {
     // The --format of a file may contradict its name.
     const auto named = PointFormatOfPath(file.path);
     const bool has_mesh = IsMeshFormat(file.format) && named.ok() && *named == file.format;
-    if (!is_file || !has_mesh || bytes > kMostSwellBytes) return std::nullopt;
+    if (!is_file || !has_mesh || bytes > kMaxSwellBytes) return std::nullopt;
     auto mesh = ReadMesh(file.path);
     // The points were read, so broken faces are not an error.
     if (!mesh.ok()) return std::nullopt;

@@ -11,14 +11,14 @@ namespace hulld {
 namespace {
 
 // Searches per call of Check, and spans per batch: enough to amortize the round trip.
-constexpr size_t kMostSearches = 4096;
-constexpr size_t kMostSpans = 4096;
-constexpr size_t kMostWaypoints = 1024;
+constexpr size_t kMaxSearches = 4096;
+constexpr size_t kMaxSpans = 4096;
+constexpr size_t kMaxWaypoints = 1024;
 // Spans of one search in a batch. More would save rounds where bounds are wide, but be wasted where
 // a contact comes first.
 constexpr size_t kSpansPerSearch = 8;
 // The search visits spans of at most 2 rad one by one.
-constexpr double kMostTurnOfSegment = 4096;
+constexpr double kMaxTurnOfSegment = 4096;
 // Times in [0, 1] that are multiples of 2^-50 are exact, as are their differences from 1.
 constexpr double kShortestSpan = 0x1p-50;
 // Covers the rounding of three sums.
@@ -55,8 +55,8 @@ ContinuousCheck::ContinuousCheck(const Client& client, const RobotModel& model, 
 }
 
 size_t ContinuousCheck::waypoints_per_call() const {
-  return std::clamp<size_t>(kMostSearches / std::max<size_t>(1, is_closed_.size()), 1,
-                            kMostWaypoints);
+  return std::clamp<size_t>(kMaxSearches / std::max<size_t>(1, is_closed_.size()), 1,
+                            kMaxWaypoints);
 }
 
 absl::Status ContinuousCheck::Check(std::span<const std::vector<double>> waypoints) {
@@ -90,8 +90,7 @@ absl::Status ContinuousCheck::AddSegments(std::span<const std::vector<double>> w
         const RobotPart& part = model_.parts[i];
         const MotionBound bound =
             BoundFixedFrame(of_links[static_cast<size_t>(part.link)], part.X_LS);
-        if (!(bound.turn <= kMostTurnOfSegment) ||
-            !std::isfinite(bound.Deviation(1, reaches_[i]))) {
+        if (!(bound.turn <= kMaxTurnOfSegment) || !std::isfinite(bound.Deviation(1, reaches_[i]))) {
           const uint64_t number = first_waypoint_ + segments_.size();
           return absl::InvalidArgumentError(absl::StrCat(
               "--continuous: ", part.name, " turns or moves too far between waypoints ", number,
@@ -119,7 +118,7 @@ absl::Status ContinuousCheck::RunRound(std::vector<Search>* searches) {
   std::vector<Asked> asked;
   for (Search& search : *searches) {
     if (search.segment > first_contact[search.pair]) search.is_done = true;
-    if (search.is_done || asked.size() >= kMostSpans) continue;
+    if (search.is_done || asked.size() >= kMaxSpans) continue;
     const size_t count = std::min(search.open.size(), kSpansPerSearch);
     for (size_t i = 0; i < count; ++i) asked.push_back({.search = &search, .span = search.open[i]});
   }
@@ -252,7 +251,7 @@ bool ContinuousCheck::CanBeAsked(const Search& search, const Span& span) const {
   const auto turns_little = [&](size_t side) {
     const uint32_t object = ObjectOf(search, side);
     return object >= scope_.parts ||
-           span.duration * segments_[search.segment].bounds[object].turn <= MotionBound::kMostTurn;
+           span.duration * segments_[search.segment].bounds[object].turn <= MotionBound::kMaxTurn;
   };
   return turns_little(0) && turns_little(1);
 }

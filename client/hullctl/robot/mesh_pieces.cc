@@ -19,7 +19,7 @@ using Vector = std::array<double, 3>;
 
 constexpr size_t kMaxConvexVertices = 4096;
 constexpr double kRelativeTolerance = 1e-3;
-constexpr off_t kMostMeshBytes = off_t{64} << 20;
+constexpr off_t kMaxMeshBytes = off_t{64} << 20;
 
 double DiagonalOf(const TriangleMesh& mesh) {
   Vector low = mesh.vertices[0];
@@ -62,7 +62,7 @@ absl::StatusOr<std::vector<MeshPiece>> ScaledPieces(std::vector<MeshPart> parts,
 
 bool IsSmall(const std::string& file) {
   struct stat info = {};
-  return stat(file.c_str(), &info) == 0 && info.st_size <= kMostMeshBytes;
+  return stat(file.c_str(), &info) == 0 && info.st_size <= kMaxMeshBytes;
 }
 
 bool AreConvexParts(const std::vector<MeshPart>& parts) {

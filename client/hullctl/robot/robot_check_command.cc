@@ -29,7 +29,7 @@ namespace hulld {
 namespace {
 
 // Maximum number of limit violations printed individually; the rest are only counted.
-constexpr size_t kMostWarnings = 5;
+constexpr size_t kMaxWarnings = 5;
 // A micrometer.
 constexpr double kDefaultResolution = 1e-6;
 
@@ -198,7 +198,7 @@ void RobotCheck::WarnOfLimits(uint64_t waypoint, const Waypoint& free_values) {
   const std::vector<std::string> problems =
       LimitProblems(model_.robot, AllJointValues(model_.robot, free_values));
   if (problems.empty()) return;
-  if (beyond_limits_++ >= kMostWarnings) return;
+  if (beyond_limits_++ >= kMaxWarnings) return;
   bar_.Clear();
   const std::string line = waypoints_.LineOf(waypoint);
   for (const std::string& problem : problems) {
@@ -411,7 +411,7 @@ void RobotCheck::Take(uint64_t waypoint, size_t pair, const AnswerRow& row,
 
 void RobotCheck::PrintFailure(uint64_t waypoint, size_t pair, const std::string& problem) {
   bar_.Clear();
-  if (failed_++ >= kMostWarnings) return;
+  if (failed_++ >= kMaxWarnings) return;
   run_.err << "hullctl: " << NameOf(pair, 0) << " with " << NameOf(pair, 1) << " at "
            << waypoints_.PlaceOf(waypoint) << ": " << problem << "\n";
 }
@@ -477,7 +477,7 @@ ExitCode RobotCheck::Run() {
   bar_.Clear();
   if (!status.ok()) return Fail(status);
   arguments_.continuous ? PrintMotionTotals() : PrintTotals();
-  if (beyond_limits_ > kMostWarnings) {
+  if (beyond_limits_ > kMaxWarnings) {
     run_.err << "hullctl: warning: " << beyond_limits_ << " waypoints exceed limits of joints\n";
   }
   if (stopped_) run_.err << "hullctl: stopped after " << checked_ << " waypoints\n";

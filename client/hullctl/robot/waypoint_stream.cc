@@ -8,7 +8,7 @@ namespace {
 
 // Enough to amortize the round trip. Observed, 18 pairs of a UR5: 2.4 million pairs per second.
 constexpr size_t kPairsPerMessage = 4096;
-constexpr size_t kMostLanes = 1024;
+constexpr size_t kMaxLanes = 1024;
 
 }  // namespace
 
@@ -20,7 +20,7 @@ WaypointStream::WaypointStream(const Client& client, CheckScope scope, v1::Wante
       tolerance_(tolerance),
       receive_(std::move(receive)) {
   const size_t pairs = std::max<size_t>(1, scope_.pairs.size() / 2);
-  lanes_ = std::clamp<size_t>(kPairsPerMessage / pairs, 1, kMostLanes);
+  lanes_ = std::clamp<size_t>(kPairsPerMessage / pairs, 1, kMaxLanes);
 }
 
 absl::Status WaypointStream::Ask(size_t count, const std::vector<double>& poses) {

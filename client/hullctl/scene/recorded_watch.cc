@@ -51,8 +51,8 @@ absl::StatusOr<RecordedWatch> ReadRecordedWatch(const std::string& path) {
   for (std::string_view line; (*source)->ReadLine(&line);) {
     const std::string_view text = Trim(line);
     if (text.empty()) continue;
-    if (watch.messages.size() == kMostRecordedMessages) {
-      return (*source)->ErrorAtLine(absl::StrCat("the viewer plays up to ", kMostRecordedMessages,
+    if (watch.messages.size() == kMaxRecordedMessages) {
+      return (*source)->ErrorAtLine(absl::StrCat("the viewer plays up to ", kMaxRecordedMessages,
                                                  " messages with events; remove the rest"));
     }
     const absl::Status added = AddLine(std::string(text), is_first, &watch);

@@ -19,7 +19,7 @@ struct RecordedWatch {
   uint64_t placements = 0;
 };
 
-inline constexpr size_t kMostRecordedMessages = 100'000;
+inline constexpr size_t kMaxRecordedMessages = 100'000;
 
 // Reads a recorded watch; "-" is standard input. Omits messages that report nothing but progress.
 // INVALID_ARGUMENT names the file and the line.

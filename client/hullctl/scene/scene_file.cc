@@ -101,17 +101,17 @@ absl::Status CheckPacked(const v1::FindCollisionsRequest& request) {
   }
   if (packed.poses_size() != kPoseNumbers * packed.hulls_size()) {
     return absl::InvalidArgumentError(
-        absl::StrCat("packedPlacements.poses holds ", packed.poses_size(), " numbers for ",
+        absl::StrCat("packedPlacements.poses has ", packed.poses_size(), " numbers for ",
                      packed.hulls_size(), " placements; each needs seven"));
   }
   if (packed.radii_size() > 0 && packed.radii_size() != packed.hulls_size()) {
     return absl::InvalidArgumentError(
-        absl::StrCat("packedPlacements.radii holds ", packed.radii_size(), " numbers for ",
+        absl::StrCat("packedPlacements.radii has ", packed.radii_size(), " numbers for ",
                      packed.hulls_size(), " placements; give one for each, or none"));
   }
   if (packed.end_poses_size() > 0 && packed.end_poses_size() != packed.poses_size()) {
     return absl::InvalidArgumentError(
-        absl::StrCat("packedPlacements.endPoses holds ", packed.end_poses_size(), " numbers for ",
+        absl::StrCat("packedPlacements.endPoses has ", packed.end_poses_size(), " numbers for ",
                      packed.hulls_size(), " placements; give seven for each, or none"));
   }
   const int count = packed.hull_ids_size() + packed.shape_sizes_size();
@@ -126,7 +126,7 @@ absl::Status CheckPacked(const v1::FindCollisionsRequest& request) {
     return absl::OkStatus();
   }
   return absl::InvalidArgumentError(absl::StrCat(
-      "packedPlacements.shapeSizes add up to ", points, " points, but shapePoints.xyz holds ",
+      "packedPlacements.shapeSizes add up to ", points, " points, but shapePoints.xyz has ",
       packed.shape_points().xyz_size(), " numbers; each point needs three"));
 }
 
@@ -157,7 +157,7 @@ absl::StatusOr<Scene> ParseScene(const std::string& text, const ObjectScanner& s
   if (absl::Status fits = CheckPacked(scene.request); !fits.ok()) return fits;
   if (scene.pairs.has_value() && scene.pairs->size() % 2 != 0) {
     return absl::InvalidArgumentError(
-        absl::StrCat("pairs holds ", scene.pairs->size(), " indices; each pair needs two"));
+        absl::StrCat("pairs has ", scene.pairs->size(), " indices; each pair needs two"));
   }
   for (const uint32_t index : scene.pairs.value_or(std::vector<uint32_t>())) {
     if (index < scene.size()) continue;
@@ -349,22 +349,22 @@ absl::StatusOr<std::vector<uint32_t>> PairsOf(const Scene& scene, const std::str
   };
   if (request.groups_size() != 0 && static_cast<uint64_t>(request.groups_size()) != n) {
     return problem(
-        absl::StrCat("groups holds ", request.groups_size(), " groups for ", n, " placements"));
+        absl::StrCat("groups has ", request.groups_size(), " groups for ", n, " placements"));
   }
   // A pair needs at least one mover; if it has one, its lower index is a mover.
   const uint64_t movers = request.has_movers() ? std::min<uint64_t>(request.movers(), n) : n;
   const std::string too_many =
-      absl::StrCat("more than ", kMostPairs,
+      absl::StrCat("more than ", kMaxPairs,
                    " pairs; split the file, or use 'hullctl scene' to find colliding pairs");
   // Groups may exclude most pairs, but each pair must be examined.
-  constexpr uint64_t kMostLooks = uint64_t{16} * kMostPairs;
-  if (movers * n > kMostLooks) return problem(too_many);
+  constexpr uint64_t kMaxLooks = uint64_t{16} * kMaxPairs;
+  if (movers * n > kMaxLooks) return problem(too_many);
   const GroupRule rule(request);
   std::vector<uint32_t> pairs;
   for (uint32_t a = 0; a < movers; ++a) {
     for (uint32_t b = a + 1; b < n; ++b) {
       if (rule.Ignores(a, b)) continue;
-      if (pairs.size() >= 2 * kMostPairs) return problem(too_many);
+      if (pairs.size() >= 2 * kMaxPairs) return problem(too_many);
       pairs.insert(pairs.end(), {a, b});
     }
   }

@@ -57,7 +57,7 @@ struct Scene {
 };
 
 // Maximum number of pairs queried from one file.
-inline constexpr uint64_t kMostPairs = uint64_t{1} << 24;
+inline constexpr uint64_t kMaxPairs = uint64_t{1} << 24;
 
 // Text about scenes in --help.
 inline constexpr char kSceneFileHelp[] =
@@ -83,7 +83,7 @@ inline constexpr char kSceneFileHelp[] =
 absl::StatusOr<Scene> ReadScene(ByteSource* source, BodyForm form = BodyForm::kWhole);
 
 // Returns the pairs of the scene, two indices each: the named pairs, or all that groups and movers
-// allow. INVALID_ARGUMENT: more than kMostPairs, none, or groups that do not match the placements.
+// allow. INVALID_ARGUMENT: more than kMaxPairs, none, or groups that do not match the placements.
 absl::StatusOr<std::vector<uint32_t>> PairsOf(const Scene& scene, const std::string& file);
 
 // INVALID_ARGUMENT, naming the line: updates of a stream follow the scene, which `command` does not

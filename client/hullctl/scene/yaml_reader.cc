@@ -17,7 +17,7 @@ namespace hulld {
 namespace {
 
 // Maximum size of a scene. Larger ones use the contract's packed form.
-constexpr size_t kMostSceneBytes = size_t{64} << 20;
+constexpr size_t kMaxSceneBytes = size_t{64} << 20;
 
 std::string PlaceText(const std::string& name, const YAML::Mark& mark) {
   if (mark.is_null()) return name;
@@ -49,9 +49,9 @@ class DocumentStart : public YAML::EventHandler {
 }  // namespace
 
 absl::StatusOr<YamlReader> YamlReader::Parse(const std::string& text, const std::string& name) {
-  if (text.size() > kMostSceneBytes) {
+  if (text.size() > kMaxSceneBytes) {
     return absl::InvalidArgumentError(absl::StrCat(
-        name, ": more than ", kMostSceneBytes, " bytes; write a larger scene as packedPlacements"));
+        name, ": more than ", kMaxSceneBytes, " bytes; write a larger scene as packedPlacements"));
   }
   // Parses at most two documents: for text such as ",", yaml-cpp 0.7 never stops finding
   // documents.
@@ -73,8 +73,9 @@ absl::StatusOr<YamlReader> YamlReader::Parse(const std::string& text, const std:
     return absl::InvalidArgumentError(absl::StrCat(name, ": contains no scene"));
   }
   if (documents > 1) {
-    return absl::InvalidArgumentError(absl::StrCat(
-        PlaceText(name, last.mark()), ": a second document starts here; a scene file holds one"));
+    return absl::InvalidArgumentError(
+        absl::StrCat(PlaceText(name, last.mark()),
+                     ": a second document starts here; a scene file contains one"));
   }
   return YamlReader(root, name);
 }

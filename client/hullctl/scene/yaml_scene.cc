@@ -319,8 +319,8 @@ class SceneParser {
       if (absl::Status taken = TakePlace(value, &placement); !taken.ok()) return taken;
       pieces_ +=
           placement.body < 0 ? 1 : scene_.bodies[static_cast<size_t>(placement.body)].pieces.size();
-      if (pieces_ > kMostPieces) {
-        return yaml_.ErrorAt(value, absl::StrCat("more than ", kMostPieces, " pieces are placed"));
+      if (pieces_ > kMaxPieces) {
+        return yaml_.ErrorAt(value, absl::StrCat("more than ", kMaxPieces, " pieces are placed"));
       }
       places_[name] = static_cast<int>(scene_.placements.size());
       if (!placement.group.empty()) groups_.insert(placement.group);
@@ -673,9 +673,9 @@ absl::StatusOr<Scene> ToScene(const SceneDescription& description, const std::st
   for (const auto& [a, b] : *description.pairs) {
     for (const uint32_t one : placed[static_cast<size_t>(a)]) {
       for (const uint32_t other : placed[static_cast<size_t>(b)]) {
-        if (scene.pairs->size() >= 2 * kMostPairs) {
+        if (scene.pairs->size() >= 2 * kMaxPairs) {
           return absl::InvalidArgumentError(
-              absl::StrCat(name, ": more than ", kMostPairs, " pairs are named"));
+              absl::StrCat(name, ": more than ", kMaxPairs, " pairs are named"));
         }
         scene.pairs->insert(scene.pairs->end(), {one, other});
       }

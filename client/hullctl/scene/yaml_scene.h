@@ -18,20 +18,20 @@ inline constexpr const char* kSceneKeys[] = {"prefix", "scale",  "hulls", "bodie
 // Parses a YAML scene; for the keys see client/guide/SCENES.md. `name` appears in errors, and
 // relative file names start at its folder. Opens none of the named files. INVALID_ARGUMENT
 // "NAME:LINE:COLUMN: message": not YAML; an unknown key; a value of the wrong type; an undefined or
-// duplicate name; more than kMostPieces pieces.
+// duplicate name; more than kMaxPieces pieces.
 absl::StatusOr<SceneDescription> ParseYamlScene(const std::string& text, const std::string& name);
 
 // Reads a file; "-" is standard input.
 absl::StatusOr<SceneDescription> ReadYamlScene(const std::string& path);
 
 // Maximum total number of pieces of a scene's placements.
-inline constexpr size_t kMostPieces = size_t{1} << 22;
+inline constexpr size_t kMaxPieces = size_t{1} << 22;
 
 // Returns the request that creates the body on the server.
 v1::PutBodyRequest BodyRequest(const BodyDefinition& body);
 
 // Returns the placements in the form of the server. Pieces of a placement, members of a group, and
-// ignored pairs are excluded. Movers come first. INVALID_ARGUMENT: more than kMostPairs named
+// ignored pairs are excluded. Movers come first. INVALID_ARGUMENT: more than kMaxPairs named
 // pairs.
 absl::StatusOr<Scene> ToScene(const SceneDescription& description, const std::string& name,
                               BodyForm form);

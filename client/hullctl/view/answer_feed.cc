@@ -14,9 +14,9 @@ namespace hulld {
 namespace {
 
 // During a drag, larger scenes are queried only at rest.
-constexpr size_t kMostObjectsInMotion = 3000;
+constexpr size_t kMaxObjectsInMotion = 3000;
 // Maximum number of colliding pairs that the page lists and highlights; totals count all.
-constexpr size_t kMostListedPairs = 5000;
+constexpr size_t kMaxListedPairs = 5000;
 
 v1::Pose ToPose(const Pose7& numbers) {
   v1::Pose pose;
@@ -159,14 +159,14 @@ class SceneAnswer {
   }
 
   void AddPair(uint32_t a, uint32_t b, v1::Relation relation) {
-    if (relation == v1::RELATION_UNSPECIFIED || shown_++ >= kMostListedPairs) return;
+    if (relation == v1::RELATION_UNSPECIFIED || shown_++ >= kMaxListedPairs) return;
     absl::StrAppend(&pairs_, pairs_.empty() ? "" : ",", "[", objects_[a], ",", objects_[b], ",",
                     QuoteJson(v1::Relation_Name(relation)), "]");
   }
 
   void AddProblem(const std::string& message) {
-    constexpr int kMostProblems = 20;
-    if (problem_count_++ >= kMostProblems) return;
+    constexpr int kMaxProblems = 20;
+    if (problem_count_++ >= kMaxProblems) return;
     absl::StrAppend(&problems_, problems_.empty() ? "" : ",", QuoteJson(message));
   }
 
@@ -405,7 +405,7 @@ void AnswerFeed::Run() {
     }
     if (question.pair && !AnswerPair(question)) return;
     if (!AnswerMotion(question)) return;
-    if (!question.rest && question.objects.size() > kMostObjectsInMotion) continue;
+    if (!question.rest && question.objects.size() > kMaxObjectsInMotion) continue;
     if (!AnswerScene(question)) return;
   }
 }

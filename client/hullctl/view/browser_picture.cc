@@ -25,8 +25,8 @@ namespace fs = std::filesystem;
 
 constexpr const char* kBrowsers[] = {"chromium", "chromium-browser", "google-chrome",
                                      "google-chrome-stable", "microsoft-edge"};
-constexpr uint32_t kLeastSide = 64;
-constexpr uint32_t kMostSide = 16384;
+constexpr uint32_t kMinSide = 64;
+constexpr uint32_t kMaxSide = 16384;
 
 // Returns an absolute path, or empty.
 std::string FindProgram(const std::string& name) {
@@ -114,14 +114,14 @@ absl::StatusOr<PictureSize> ParsePictureSize(const std::string& text) {
   const std::vector<std::string> sides = absl::StrSplit(text, 'x');
   PictureSize size;
   const auto is_side = [](const std::string& side, uint32_t* pixels) {
-    return absl::SimpleAtoi(side, pixels) && *pixels >= kLeastSide && *pixels <= kMostSide;
+    return absl::SimpleAtoi(side, pixels) && *pixels >= kMinSide && *pixels <= kMaxSide;
   };
   if (sides.size() == 2 && is_side(sides[0], &size.width) && is_side(sides[1], &size.height)) {
     return size;
   }
   return absl::InvalidArgumentError(
-      absl::StrCat("\"", text, "\" is not a size such as 1600x1000, each side from ", kLeastSide,
-                   " to ", kMostSide, " pixels"));
+      absl::StrCat("\"", text, "\" is not a size such as 1600x1000, each side from ", kMinSide,
+                   " to ", kMaxSide, " pixels"));
 }
 
 absl::StatusOr<std::string> PictureOf(const std::string& picture_page) {

@@ -44,7 +44,7 @@ bool EditQueue::Add(ViewEdit edit) {
   const auto last = last_.find(edit.hull_id);
   const bool joins = last != last_.end() && last->second->action == edit.action;
   const size_t numbers = joins ? edit.points.size() : NumbersOf(edit);
-  if (numbers > kMostNumbers - numbers_) return false;
+  if (numbers > kMaxNumbers - numbers_) return false;
   numbers_ += numbers;
   if (joins) {
     std::vector<double>& points = last->second->points;

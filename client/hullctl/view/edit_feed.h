@@ -23,7 +23,7 @@ class EditQueue {
  public:
   // Maximum number of pending coordinates, about 100 MB. A choice: one message of a page has at
   // most 4 MiB (BridgeOptions::max_message_bytes).
-  static constexpr size_t kMostNumbers = size_t{12} << 20;
+  static constexpr size_t kMaxNumbers = size_t{12} << 20;
 
   // Returns true if the edit was accepted: the queue had room.
   [[nodiscard]] bool Add(ViewEdit edit);

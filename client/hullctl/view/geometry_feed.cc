@@ -6,7 +6,7 @@ namespace hulld {
 namespace {
 
 // Pages request each hull once, and again if it changed after they received it.
-constexpr size_t kMostShapes = 1 << 20;
+constexpr size_t kMaxShapes = 1 << 20;
 
 std::string MessageOf(const absl::Status& status) {
   return std::string(status.message().data(), status.message().size());
@@ -46,7 +46,7 @@ std::string FrameFor(const Client& client, const ShapeFiles& files, const ShapeR
 GeometryFeed::GeometryFeed(const Client& client, std::shared_ptr<PageChannel> page)
     : files_(std::make_shared<ShapeFiles>()),
       page_(std::move(page)),
-      worker_(kMostShapes, [&client, this](const Order& order) {
+      worker_(kMaxShapes, [&client, this](const Order& order) {
         return page_->SendBinary(FrameFor(client, *order.files, order.shape));
       }) {}
 

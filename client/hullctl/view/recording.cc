@@ -119,7 +119,7 @@ absl::StatusOr<std::string> AllStates(const Client& client, const ViewScene& sce
                                       const std::vector<double>& times) {
   std::vector<ViewObject> objects = scene.objects;
   const size_t count = std::max(times.size(), scene.joints.waypoints.size());
-  const bool with_answers = count * PairCount(scene) <= kMostRecordedAnswers;
+  const bool with_answers = count * PairCount(scene) <= kMaxRecordedAnswers;
   std::string states = "[";
   for (size_t i = 0; i < count; ++i) {
     const double time = i < times.size() ? times[i] : 0;
@@ -149,7 +149,7 @@ absl::StatusOr<std::string> RecordScene(const ViewProgram& program, const ViewSc
   if (std::ranges::any_of(scene.objects, moves)) {
     for (int step = 1; step <= kRecordedSteps; ++step) times.insert(1.0 * step / kRecordedSteps);
   }
-  const bool is_small = PairCount(scene) <= kMostRecordedAnswers;
+  const bool is_small = PairCount(scene) <= kMaxRecordedAnswers;
   const std::string motions = is_small ? AllMotions(program.client, scene.objects, &times) : "[]";
   const auto states = AllStates(program.client, scene, {times.begin(), times.end()});
   if (!states.ok()) return states.status();

@@ -9,13 +9,13 @@
 
 namespace hulld {
 
-inline constexpr size_t kMostRecordedAnswers = 2000;
+inline constexpr size_t kMaxRecordedAnswers = 2000;
 // Steps of the time of a scene with motions, as in page/motion.js.
 inline constexpr int kRecordedSteps = 64;
 
 // Returns the current content of a scene, for a page without a bridge (protocol.h): shapes and, at
 // each waypoint or step of the time, poses and colliding pairs. The full answer for each pair of
-// objects is included if these are at most kMostRecordedAnswers; so is its first contact. Returns
+// objects is included if these are at most kMaxRecordedAnswers; so is its first contact. Returns
 // errors of the calls.
 absl::StatusOr<std::string> RecordScene(const ViewProgram& program, const ViewScene& scene);
 

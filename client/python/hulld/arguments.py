@@ -14,9 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 _ID = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*(/[A-Za-z0-9][A-Za-z0-9._-]*)*")
-_MOST_ID_CHARACTERS = 256
-_MOST_UINT32 = 2**32 - 1
-_MOST_UINT64 = 2**64 - 1
+_MAX_ID_CHARACTERS = 256
+_MAX_UINT32 = 2**32 - 1
+_MAX_UINT64 = 2**64 - 1
 #: The power of two beyond which doubles cannot represent all integers.
 _EXACT_INTEGERS = 2.0**53
 
@@ -37,8 +37,8 @@ def number(value: Any, name: str, *, least: float = -math.inf, finite: bool = Tr
         raise ValueError(f"{name} is {value}; it must be finite")
     if double != value:
         raise ValueError(
-            f"{name} is {value}, which no double holds exactly; convert it explicitly, as with "
-            "float()"
+            f"{name} is {value}, which no double represents exactly; convert it explicitly, as "
+            "with float()"
         )
     if double < least:
         raise ValueError(f"{name} is {value}; it must be at least {least:g}")
@@ -68,7 +68,7 @@ def seconds(value: Any, name: str = "timeout") -> float | None:
     return duration
 
 
-def count(value: Any, name: str, *, least: int = 0, most: int = _MOST_UINT32) -> int:
+def count(value: Any, name: str, *, least: int = 0, most: int = _MAX_UINT32) -> int:
     """An integer from `least` to `most`."""
     if isinstance(value, (bool, np.bool_)):
         raise TypeError(f"{name} is {value!r}; it must be an integer")
@@ -87,7 +87,7 @@ def optional_count(value: Any, name: str, *, least: int = 0) -> int | None:
 
 def revision(value: Any, name: str = "if_revision") -> int | None:
     """A revision of the store; None: no condition."""
-    return None if value is None else count(value, name, most=_MOST_UINT64)
+    return None if value is None else count(value, name, most=_MAX_UINT64)
 
 
 def text(value: Any, name: str, *, least: int = 0) -> str:
@@ -96,9 +96,9 @@ def text(value: Any, name: str, *, least: int = 0) -> str:
         raise TypeError(f"{name} is {value!r}; it must be a string")
     if len(value) < least:
         raise ValueError(f"{name} is empty")
-    if len(value) > _MOST_ID_CHARACTERS:
+    if len(value) > _MAX_ID_CHARACTERS:
         raise ValueError(
-            f"{name} has {len(value)} characters; at most {_MOST_ID_CHARACTERS} are allowed"
+            f"{name} has {len(value)} characters; at most {_MAX_ID_CHARACTERS} are allowed"
         )
     return value
 
@@ -179,7 +179,7 @@ def as_floats(array: npt.NDArray[Any], name: str) -> npt.NDArray[Any]:
     if kind == "f" and size == 2:
         return array.astype(np.float32)
     if kind not in "iuf":
-        raise TypeError(f"{name} holds {array.dtype}, not numbers")
+        raise TypeError(f"{name} has {array.dtype}, not numbers")
     doubles = array.astype(np.float64)
     # Compares in the original type: a comparison as doubles would round both sides.
     with np.errstate(invalid="ignore"):
@@ -192,7 +192,7 @@ def as_floats(array: npt.NDArray[Any], name: str) -> npt.NDArray[Any]:
     if not same.all():
         at = tuple(int(index) for index in np.argwhere(~same)[0])
         raise ValueError(
-            f"{name}{place(at)} is {array[at]}, which no double holds exactly; convert it "
+            f"{name}{place(at)} is {array[at]}, which no double represents exactly; convert it "
             f"explicitly, as with {name}.astype(float)"
         )
     return doubles

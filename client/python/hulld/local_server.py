@@ -32,7 +32,7 @@ _LISTENING = re.compile(r"listening on (\S+)")
 _LINES = 200
 _START_SECONDS = 60.0
 #: Number of hulls of check() kept for later calls.
-_MOST_SHAPES = 64
+_MAX_SHAPES = 64
 _STOP_SECONDS = 10.0
 # Its input is a pipe from this process: when this process ends in any way, the script ends, stops
 # the server, and removes its folder, $0.
@@ -295,6 +295,6 @@ def check(
             Placement(ids[1], pose_b, radius=radius_b),
             **query,
         )
-        while len(known) > _MOST_SHAPES:
+        while len(known) > _MAX_SHAPES:
             client.delete_hull(known.popitem(last=False)[0])
     return answer

@@ -22,7 +22,7 @@ from hulld.geometry.poses import PosesLike
 from hulld.retry import RetryPolicy
 
 #: Messages that a watch reads ahead. The server merges changes behind them.
-MOST_WAITING = 16
+MAX_WAITING = 16
 
 
 class HullWatch:
@@ -168,7 +168,7 @@ class CollisionWatch:
     def _open(self) -> Duplex:
         with self._lock:
             if self._connection is None:
-                self._connection = Duplex(self._call, self._metadata, MOST_WAITING)
+                self._connection = Duplex(self._call, self._metadata, MAX_WAITING)
                 self._updates_before = self._watched.updates
                 self._first = True
                 self._connection.send(self._watched.opening(), None)

@@ -11,7 +11,7 @@ namespace hulld {
 namespace {
 
 // On a surface this small, testing a point against all triangles is cheap.
-constexpr size_t kMostTrianglesToTest = 64;
+constexpr size_t kMaxTrianglesToTest = 64;
 // A block of at most this many points is not sampled: all are tested against all triangles.
 constexpr size_t kSmallBlock = 4096;
 // Each sample, and finally the block, is this many times the previous sample.
@@ -29,7 +29,7 @@ constexpr double kWalksPerSurvivor = 0.6;
 
 // Share of duplicates in a sample above which the rest of the block is inserted in rounds, whose
 // order places neighbors close in memory.
-constexpr double kMostDuplicates = 0.875;
+constexpr double kMaxDuplicates = 0.875;
 
 // One call of InsertBlock.
 //
@@ -93,7 +93,7 @@ class BlockInsertion {
   ConflictLists::Outcome InsertSample(size_t stride) {
     surface_.BeginInsertions(vertices_);
     ConflictLists lists(surface_, vertices_, poll_);
-    if (surface_.triangle_count() <= kMostTrianglesToTest) {
+    if (surface_.triangle_count() <= kMaxTrianglesToTest) {
       lists.Take(Sample(stride));
     } else if (!TakeByDirection(stride, lists)) {
       return ConflictLists::Outcome::kGaveUp;
@@ -153,7 +153,7 @@ class BlockInsertion {
         ++duplicates;
       }
     }
-    if (static_cast<double>(duplicates) > kMostDuplicates * static_cast<double>(asked_)) {
+    if (static_cast<double>(duplicates) > kMaxDuplicates * static_cast<double>(asked_)) {
       rest_ = std::move(outside);
       rest_.insert(rest_.end(), astray_.begin(), astray_.end());
       return false;

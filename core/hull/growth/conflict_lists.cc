@@ -14,7 +14,7 @@ constexpr uint64_t kStepsPerInsertion = 4;
 constexpr size_t kTrialInsertions = 24;
 // Average moves of a point above which another order of insertion is better. Observed: at most 8
 // for clouds and meshes with most points inside.
-constexpr size_t kMostMoves = 32;
+constexpr size_t kMaxMoves = 32;
 
 }  // namespace
 
@@ -77,7 +77,7 @@ ConflictLists::Outcome ConflictLists::InsertAll() {
     if (poll_.Step(kStepsPerInsertion + surface_.TakeSteps())) return Outcome::kStopped;
     ++insertions;
     InsertFrom(id);
-    if (moved_ > kMostMoves * taken_ || IsMostlyOutside(insertions)) return Outcome::kGaveUp;
+    if (moved_ > kMaxMoves * taken_ || IsMostlyOutside(insertions)) return Outcome::kGaveUp;
   }
   return poll_.stopped() ? Outcome::kStopped : Outcome::kDone;
 }

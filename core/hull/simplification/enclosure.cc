@@ -21,11 +21,11 @@ namespace {
 // the amount added by pushing doubles each time.
 constexpr double kFirstInflation = 0x1p-50;
 constexpr double kFirstGrowth = 0x1p-6;
-constexpr int kMostAttempts = 18;
+constexpr int kMaxAttempts = 18;
 // A vertex is pushed along the mean of its facets' normals. This is the least cosine used for the
 // angle between the mean and a normal. It limits the distance if they differ widely, as at the tip
 // of a needle.
-constexpr double kLeastCosine = 0.05;
+constexpr double kMinCosine = 0.05;
 // Vertices of the full hull per check. The same number, spread over all vertices, is checked first
 // because most failing hulls fail early.
 constexpr size_t kVerticesPerCheck = 1024;
@@ -51,7 +51,7 @@ Enclosure::Enclosure(const Hull& full, std::span<const Vector> unit_points, cons
       poll_(poll),
       support_(full, unit_points, poll) {}
 
-std::optional<SimplifiedHull> Enclosure::ByPushing(const Hull& inside, double most_error) {
+std::optional<SimplifiedHull> Enclosure::ByPushing(const Hull& inside, double max_error) {
   HULLD_CHECK(inside.dimension() == full_.dimension() && inside.dimension() >= 2);
   const bool is_flat = inside.dimension() == 2;
   const std::vector<Vector> points = scale_.ToUnit(inside.vertices());
@@ -88,19 +88,19 @@ std::optional<SimplifiedHull> Enclosure::ByPushing(const Hull& inside, double mo
   std::vector<double> push(points.size(), 0);
   for (size_t k = 0; k < sides.size(); ++k) {
     for (const uint32_t v : sides[k]) {
-      const double cosine = std::max(kLeastCosine, normals[k].dot(along[v]));
+      const double cosine = std::max(kMinCosine, normals[k].dot(along[v]));
       push[v] = std::max(push[v], gaps[k] / cosine);
     }
   }
   // Without this check, most of the time would be spent on enclosures with too large an error.
-  const double enough = scale_.LengthToUnit(most_error);
+  const double enough = scale_.LengthToUnit(max_error);
   for (size_t v = 0; v < points.size(); ++v) {
     if (poll_.Step()) return std::nullopt;
     const Vector p = points[v] + push[v] * along[v];
     if (support_.DistanceBound(p, places[v], enough) > enough) return std::nullopt;
   }
 
-  for (int attempt = 0; attempt < kMostAttempts && !poll_.stopped(); ++attempt) {
+  for (int attempt = 0; attempt < kMaxAttempts && !poll_.stopped(); ++attempt) {
     const double inflation = InflationOf(attempt);
     const double growth = attempt < 2 ? 1 : 1 + std::ldexp(kFirstGrowth, attempt - 2);
     std::vector<Corner> pushed;

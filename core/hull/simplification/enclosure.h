@@ -30,8 +30,8 @@ class Enclosure {
   // Pushes each vertex of the inside hull outwards beyond the planes that support the full hull
   // along the vertex's facets; a polygon becomes a thin prism. The result has as many vertices as
   // the inside hull, twice as many for a polygon. Also returns nothing if the error would exceed
-  // most_error, in the caller's length unit. Requires: the same dimension.
-  std::optional<SimplifiedHull> ByPushing(const Hull& inside, double most_error);
+  // max_error, in the caller's length unit. Requires: the same dimension.
+  std::optional<SimplifiedHull> ByPushing(const Hull& inside, double max_error);
   // Returns the box along the axes: 8 vertices, fewer for a shape that is flat along an axis.
   // Always has a value.
   std::optional<SimplifiedHull> ByBox();

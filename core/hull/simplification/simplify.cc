@@ -24,7 +24,7 @@ namespace {
 
 constexpr size_t kBoxVertices = 8;
 
-absl::Status CheckTarget(const SimplifyTarget& target, size_t least_vertices) {
+absl::Status CheckTarget(const SimplifyTarget& target, size_t min_vertices) {
   if (std::isnan(target.max_error) || target.max_error < 0) {
     return absl::InvalidArgumentError(
         absl::StrCat("max_error is ", std::isnan(target.max_error) ? "NaN" : "negative",
@@ -36,9 +36,9 @@ absl::Status CheckTarget(const SimplifyTarget& target, size_t least_vertices) {
   if (target.max_vertices == 0 && target.max_error == 0) {
     return absl::InvalidArgumentError("set max_vertices, max_error, or both");
   }
-  if (target.max_vertices != 0 && target.max_vertices < least_vertices) {
+  if (target.max_vertices != 0 && target.max_vertices < min_vertices) {
     return absl::InvalidArgumentError(absl::StrCat("max_vertices is ", target.max_vertices,
-                                                   "; it must be at least ", least_vertices));
+                                                   "; it must be at least ", min_vertices));
   }
   return absl::OkStatus();
 }
@@ -96,7 +96,7 @@ class OutsideSearch {
   }
 
   // Returns the largest error of an enclosure that may be better than the best.
-  double MostError() const {
+  double MaxError() const {
     return best_ ? std::max(best_->error, target_.max_error) : std::numeric_limits<double>::max();
   }
 
@@ -105,7 +105,7 @@ class OutsideSearch {
     const std::vector<uint32_t> first = order_.First(inside_vertices);
     if (poll_.stopped()) return false;
     const std::optional<Hull> inside = HullOfSubset(hull_, first, poll_);
-    return inside && Consider(enclosure_.ByPushing(*inside, MostError()));
+    return inside && Consider(enclosure_.ByPushing(*inside, MaxError()));
   }
 
   size_t CornersPerVertex() const { return hull_.dimension() == 2 ? 2 : 1; }

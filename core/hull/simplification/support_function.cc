@@ -16,13 +16,13 @@ constexpr uint32_t kLeafVertices = 8;
 // Number of vertices partitioned in the time of about one poll step.
 constexpr uint32_t kVerticesPerStep = 256;
 // Maximum degree of a vertex to climb from.
-constexpr size_t kMostNeighbors = 64;
+constexpr size_t kMaxNeighbors = 64;
 // Maximum number of vertices to climb to, so that a path around a long edge of small facets is not
 // walked to its end.
-constexpr int kMostClimbs = 256;
+constexpr int kMaxClimbs = 256;
 // Maximum number of support points for one distance. Each lowers the bound, which is valid after
 // any number of them.
-constexpr int kMostSupportPoints = 32;
+constexpr int kMaxSupportPoints = 32;
 // Relative gap between bound and distance below which another support point is not worth its cost.
 constexpr double kRelativeEnough = 1e-9;
 
@@ -83,10 +83,10 @@ void SupportFunction::Build(uint32_t first, uint32_t end, StopPoll& poll) {
 uint32_t SupportFunction::FarthestAlong(const Vector& direction, uint32_t start) const {
   uint32_t best = start;
   double most = points_[best].dot(direction);
-  for (int climbs = 0; climbs < kMostClimbs; ++climbs) {
+  for (int climbs = 0; climbs < kMaxClimbs; ++climbs) {
     const uint32_t at = best;
     const std::span<const uint32_t> neighbors = NeighborsOf(at);
-    if (neighbors.size() > kMostNeighbors) break;
+    if (neighbors.size() > kMaxNeighbors) break;
     for (const uint32_t next : neighbors) {
       if (const double reach = points_[next].dot(direction); reach > most) {
         most = reach;
@@ -130,7 +130,7 @@ double SupportFunction::DistanceBound(const Vector& p, uint32_t start, double en
   std::array<Vector, 3> corners = {points_[start], points_[start], points_[start]};
   TriangleDistance best = DistanceToTriangle(corners[0], corners[1], corners[2], p);
   uint32_t at = start;
-  for (int k = 0; k < kMostSupportPoints && best.bound > enough; ++k) {
+  for (int k = 0; k < kMaxSupportPoints && best.bound > enough; ++k) {
     const Vector toward = (p - best.nearest).stableNormalized();
     at = FarthestAlong(toward, at);
     const Vector& support = points_[at];

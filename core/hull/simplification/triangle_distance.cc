@@ -54,7 +54,7 @@ TriangleDistance DistanceToTriangle(const Vector& a, const Vector& b, const Vect
   const Vector f = c - a;
   const Vector offset = p - a;
   const double size = LargestComponent(offset) + LargestComponent(e) + LargestComponent(f);
-  if (size == 0) return {kLeastPositive, a};
+  if (size == 0) return {kMinPositive, a};
   auto [s, t] = NearestOnTriangle(e / size, f / size, offset / size);
   if (!(s >= 0 && t >= 0 && s + t <= 1)) {
     s = std::clamp(s, 0.0, 1.0);
@@ -63,7 +63,7 @@ TriangleDistance DistanceToTriangle(const Vector& a, const Vector& b, const Vect
   }
   const Vector along = s * e + t * f;
   const double distance = (offset - along).stableNorm();
-  return {distance + kSubsetDistanceErrorFactor * (distance + size) + kLeastPositive, a + along};
+  return {distance + kSubsetDistanceErrorFactor * (distance + size) + kMinPositive, a + along};
 }
 
 }  // namespace hulld

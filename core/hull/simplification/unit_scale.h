@@ -21,7 +21,7 @@ class UnitScale {
   }
 
   // Exact except for components that become subnormal, which err by at most 2^-1075 each (see
-  // kLeastPositive).
+  // kMinPositive).
   Vector ToUnit(const Vector& p) const { return Times(p, -exponent_); }
   std::vector<Vector> ToUnit(std::span<const Vector> points) const {
     std::vector<Vector> scaled;

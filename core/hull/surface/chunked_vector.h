@@ -108,7 +108,7 @@ class ChunkedVector {
   static constexpr int kBits = 8;
   static constexpr size_t kChunk = size_t{1} << kBits;
   static constexpr size_t kMask = kChunk - 1;
-  static constexpr size_t kLeastCapacity = 8;
+  static constexpr size_t kMinCapacity = 8;
   // One bit for each element of a chunk: set if the journal contains it.
   using Noted = std::array<uint64_t, kChunk / 64>;
   struct Change {
@@ -117,7 +117,7 @@ class ChunkedVector {
   };
 
   void GrowFirst() {
-    const size_t capacity = std::max(kLeastCapacity, 2 * size_);
+    const size_t capacity = std::max(kMinCapacity, 2 * size_);
     auto grown = std::make_unique_for_overwrite<T[]>(capacity);
     if (chunks_.empty()) chunks_.emplace_back();
     std::copy_n(chunks_[0].get(), size_, grown.get());

@@ -20,7 +20,7 @@ namespace hulld {
 namespace {
 
 // The least pivot of the moments, relative to their sum along the axes: flatter sets have no frame.
-constexpr double kLeastRelativeMoment = 0x1p-40;
+constexpr double kMinRelativeMoment = 0x1p-40;
 // The condition number of L above which it is worth its multiplications.
 constexpr double kWorthAFrame = 4;
 
@@ -40,7 +40,7 @@ MapFrame::MapFrame(const Vector& center, const Eigen::Matrix3d& moments) : cente
       factor(i, j) = (c(i, j) - factor.row(i).dot(factor.row(j))) / factor(j, j);
     }
     const double pivot = c(i, i) - factor.row(i).squaredNorm();
-    if (!(pivot >= kLeastRelativeMoment)) return;
+    if (!(pivot >= kMinRelativeMoment)) return;
     factor(i, i) = std::sqrt(pivot);
     inverse.row(i) = -(factor.row(i).head(i) * inverse.topRows(i)) / factor(i, i);
     inverse(i, i) = 1 / factor(i, i);
@@ -109,12 +109,12 @@ Vector DirectionMap::CornerDirection(int face, int i, int j) const {
 // value the total is at most ratio (24 + 16 stretch) u0, with ratio = largest / least reach and
 // stretch = |L| (E + |c|) / least reach; half of kDirectionMapMargin bounds it. Products that
 // underflow add less than the slack, because distances are at least kMapMinDistance. Proven.
-void DirectionMap::Finish(double least_reach, double largest_reach, double extent) {
+void DirectionMap::Finish(double min_reach, double largest_reach, double extent) {
   HULLD_CHECK(gauges_.size() == corner_count() && hints_.size() == cell_count());
-  if (!(least_reach > 0)) return;
-  const double ratio = largest_reach / least_reach;
+  if (!(min_reach > 0)) return;
+  const double ratio = largest_reach / min_reach;
   const double stretch =
-      RowSumNorm(frame_.matrix()) * (extent + LargestComponent(center())) / least_reach;
+      RowSumNorm(frame_.matrix()) * (extent + LargestComponent(center())) / min_reach;
   const double error = ratio * (24 + 16 * stretch) * kUnitRoundoff;
   rejects_ = error < 0.5 * kDirectionMapMargin;
 }

@@ -88,7 +88,7 @@ class DirectionMap {
   // components, of the set's extent from the center. If the shape is too slender for the rounding
   // of this map to be negligible, no point is certainly inside. Requires: all corners and cells
   // have been appended.
-  void Finish(double least_reach, double largest_reach, double extent);
+  void Finish(double min_reach, double largest_reach, double extent);
 
   const MapFrame& frame() const { return frame_; }
   const Vector& center() const { return frame_.center(); }

@@ -290,7 +290,7 @@ class Surface {
   Ray RayTo(const Vector& point) const;
   size_t EdgeToward(const VertexTable& vertices, const SurfaceTriangle& t, const Vector& point,
                     const Ray& ray, std::optional<uint32_t> first) const;
-  double LeastTurn(const VertexTable& vertices, TriangleId id, const Vector& direction) const;
+  double MinTurn(const VertexTable& vertices, TriangleId id, const Vector& direction) const;
   Location Scan(const VertexTable& vertices, const Vector& point, double size) const;
   void Measure(const VertexTable& vertices);
   void Update(const VertexTable& vertices);

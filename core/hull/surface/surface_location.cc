@@ -17,7 +17,7 @@ namespace {
 
 // Maximum number of rounds of aiming at the surface, each at a plane nearer than the previous one;
 // more do not pay off.
-constexpr int kMostRounds = 64;
+constexpr int kMaxRounds = 64;
 
 // A smaller surface is faster to walk across than to measure.
 constexpr size_t kWorthMeasuring = 64;
@@ -76,8 +76,7 @@ size_t Surface::EdgeToward(const VertexTable& vertices, const SurfaceTriangle& t
 
 // Returns the depth of the direction within the triangle's cone, negative outside, in no particular
 // unit: the least of the values that EdgeToward compares.
-double Surface::LeastTurn(const VertexTable& vertices, TriangleId id,
-                          const Vector& direction) const {
+double Surface::MinTurn(const VertexTable& vertices, TriangleId id, const Vector& direction) const {
   const Vector& center = directions_->center();
   const SurfaceTriangle& t = triangles_[id];
   const Vector a = vertices[t.corners[0]] - center;
@@ -246,7 +245,7 @@ void Surface::MeasureCorner(const VertexTable& vertices) {
   TriangleId near = Alive(m.hint[j == 0 ? 0 : j - 1]);
   if (m.i > 0 && j > 0) {
     const TriangleId above = Alive(hint_above);
-    if (LeastTurn(vertices, above, direction) > LeastTurn(vertices, near, direction)) near = above;
+    if (MinTurn(vertices, above, direction) > MinTurn(vertices, near, direction)) near = above;
   }
   const double reach = Reach(vertices, direction, near);
   m.map.AppendCorner(reach);
@@ -273,7 +272,7 @@ double Surface::Reach(const VertexTable& vertices, const Vector& direction, Tria
   // needed. If many triangles are nearly coplanar, their rounded planes are inaccurate, so the
   // steps grow.
   double step_back = 0x1p-30;
-  for (int round = 0; round < kMostRounds; ++round) {
+  for (int round = 0; round < kMaxRounds; ++round) {
     const SurfaceTriangle& t = triangles_[near];
     const double climb = t.normal.dot(direction);
     const double height = t.offset - t.normal.dot(center);

@@ -257,10 +257,10 @@ void BodySearch::TakeUpSeparation(const Answer& answer, PiecePair pieces) {
   const Separation& separation = *answer.separation;
   if (Strength(answer.relation) > Strength(relation_)) relation_ = answer.relation;
   within_clearance_ |= answer.within_clearance.value_or(false);
-  least_low_ = std::min(least_low_, separation.value - separation.bound);
-  least_high_ = std::min(least_high_, separation.value + separation.bound);
-  if (decided_ && separation.value >= least_value_) return;
-  least_value_ = separation.value;
+  min_low_ = std::min(min_low_, separation.value - separation.bound);
+  min_high_ = std::min(min_high_, separation.value + separation.bound);
+  if (decided_ && separation.value >= min_value_) return;
+  min_value_ = separation.value;
   decided_ = pieces;
 }
 
@@ -298,7 +298,7 @@ absl::StatusOr<BodyAnswer> BodySearch::TakeLeast() const {
   if (!result.answer.separation || relation_ == Relation::kTouching) return result;
   Separation& separation = *result.answer.separation;
   // Another pair with smaller bounds may have the least separation.
-  const double bound = std::max(separation.value - least_low_, least_high_ - separation.value);
+  const double bound = std::max(separation.value - min_low_, min_high_ - separation.value);
   if (bound > separation.bound) separation.bound = std::nextafter(bound, kInfinity);
   return result;
 }

@@ -100,7 +100,7 @@ class BodySearch {
 
   double Gap(const Box& of_x, const Box& of_y);
   // Pairs farther apart than this cannot change the answer.
-  double Limit() const { return wants_least_ ? least_high_ : limit_; }
+  double Limit() const { return wants_least_ ? min_high_ : limit_; }
   // Excludes pairs that can change neither the relation nor within_clearance. For searches without
   // details.
   void UpdateLimit();
@@ -143,9 +143,9 @@ class BodySearch {
   bool within_clearance_ = false;
   std::optional<PiecePair> decided_;
   // The least separation found, and bounds of the least over all pairs found.
-  double least_value_ = std::numeric_limits<double>::infinity();
-  double least_low_ = std::numeric_limits<double>::infinity();
-  double least_high_ = std::numeric_limits<double>::infinity();
+  double min_value_ = std::numeric_limits<double>::infinity();
+  double min_low_ = std::numeric_limits<double>::infinity();
+  double min_high_ = std::numeric_limits<double>::infinity();
 };
 
 // Returns OK, or INVALID_ARGUMENT for options that fail ValidateOptions or that select the textbook

@@ -24,7 +24,7 @@ namespace {
 
 // Maximum number of seed vertices inserted, each in O(facets): the last ones, which are nearest. A
 // choice.
-constexpr size_t kMostSeeds = 1024;
+constexpr size_t kMaxSeeds = 1024;
 
 // The plane n.w = offset of a facet, n outward. `key` is its signed distance from the origin in
 // floating point, in units of a common power of two.
@@ -50,7 +50,7 @@ class ExactExpansion {
 
   absl::StatusOr<ExactNearest> Run(std::span<const VertexPair> seed) {
     if (!Start(seed)) return Stopped();
-    for (const VertexPair& p : seed.last(std::min(seed.size(), kMostSeeds))) {
+    for (const VertexPair& p : seed.last(std::min(seed.size(), kMaxSeeds))) {
       if (poll_.Poll()) return Stopped();
       Insert(pair_.Corner(p));
     }

@@ -14,10 +14,10 @@ namespace hulld {
 namespace {
 
 // Maximum bits of a component: four squares, and sums of products of that size, stay below 2^123.
-constexpr int kMostQuaternionBits = 60;
+constexpr int kMaxQuaternionBits = 60;
 // Maximum bits of two norms together: their product, and sums of three such products, stay below
 // 2^123.
-constexpr int kMostNormBits = 120;
+constexpr int kMaxNormBits = 120;
 
 int BitWidth(Int128 magnitude) {
   const auto high = static_cast<uint64_t>(magnitude >> 64);
@@ -107,7 +107,7 @@ bool FindSmallRotation(const std::array<double, 4>& q, SmallRotation& rotation) 
     exponent = std::min(exponent, LowestBitExponent(component));
     above = std::max(above, ExponentAbove(component));
   }
-  if (above - exponent > kMostQuaternionBits) return false;
+  if (above - exponent > kMaxQuaternionBits) return false;
   for (int i = 0; i < 4; ++i) {
     integers[i] = static_cast<int64_t>(WideIntegerOf<1>(q[i], exponent).word(0));
   }
@@ -125,7 +125,7 @@ bool FindSmallRotation(const PlacedHull& placed, SmallRotation& rotation) {
   if (!FindSmallRotation(placed.product()->X_BP().q, inner)) return false;
   // Rows have the length of the norm, so each of the three products below is at most the product of
   // the norms.
-  if (BitWidth(outer.norm) + BitWidth(inner.norm) > kMostNormBits) return false;
+  if (BitWidth(outer.norm) + BitWidth(inner.norm) > kMaxNormBits) return false;
   rotation.norm = outer.norm * inner.norm;
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) {

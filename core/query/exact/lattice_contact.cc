@@ -67,15 +67,15 @@ bool IsAlone(std::span<const uint32_t> candidates, uint32_t i) {
 // to a search that polls.
 bool TouchesAcross(const FloatPair& pair, const Vector& n) {
   CandidateBuffer buffer;
-  double most_a = -kInfinity;
+  double max_a = -kInfinity;
   const std::span<const uint32_t> a = pair.CandidatesA(n, 0, buffer);
   if (a.size() > ScanPoll::kItemsPerPoll) return false;
-  for (const uint32_t i : a) most_a = std::max(most_a, n.dot(Vector(pair.PositionA(i))));
-  double least_b = kInfinity;
+  for (const uint32_t i : a) max_a = std::max(max_a, n.dot(Vector(pair.PositionA(i))));
+  double min_b = kInfinity;
   const std::span<const uint32_t> b = pair.CandidatesB(n, 0, buffer);
   if (b.size() > ScanPoll::kItemsPerPoll) return false;
-  for (const uint32_t i : b) least_b = std::min(least_b, n.dot(Vector(pair.PositionB(i))));
-  return most_a == least_b;
+  for (const uint32_t i : b) min_b = std::min(min_b, n.dot(Vector(pair.PositionB(i))));
+  return max_a == min_b;
 }
 
 // Finds a contact between a vertex of A and a vertex of B along a direction that rounding may have

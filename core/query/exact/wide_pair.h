@@ -40,8 +40,8 @@ class WidePair {
   using Direction = WideVector<2 * kWords>;
 
   static bool Fits(const SmallFrame& frame) {
-    return WordsFor(frame.bits) <= kWords && frame.a.own_bits <= kMostOwnBits &&
-           frame.b.own_bits <= kMostOwnBits;
+    return WordsFor(frame.bits) <= kWords && frame.a.own_bits <= kMaxOwnBits &&
+           frame.b.own_bits <= kMaxOwnBits;
   }
 
   // Requires: Fits(frame), and the frame of `filter`. `filter` and should_stop, which may be empty,
@@ -138,9 +138,9 @@ class WidePair {
  private:
   // Own coordinates of at most this many bits fit in one word, and so do sums of ten of them.
   static constexpr int kOneWordBits = 59;
-  static constexpr int kMostOwnBits = kWords == 1 ? kOneWordBits : kOneWordBits + 64;
+  static constexpr int kMaxOwnBits = kWords == 1 ? kOneWordBits : kOneWordBits + 64;
   // Exponents of at most this magnitude have a normal power of two and an inverse.
-  static constexpr int kMostScaled = 1000;
+  static constexpr int kMaxScaled = 1000;
   // Number of vertices, from the first on, that are cached after they are multiplied out.
   static constexpr uint32_t kKept = 32;
 
@@ -148,7 +148,7 @@ class WidePair {
     Side(const PlacedHull& hull, const SmallFrame::Side& frame)
         : placed(&hull),
           exponent(frame.exponent),
-          per_unit(std::abs(exponent) <= kMostScaled ? std::ldexp(1.0, -exponent) : 0),
+          per_unit(std::abs(exponent) <= kMaxScaled ? std::ldexp(1.0, -exponent) : 0),
           is_narrow(frame.own_bits <= kOneWordBits) {}
 
     template <int kOwnWords>

@@ -26,9 +26,7 @@ class ExpandingSurface {
   const std::vector<Facet>& facets() const { return facets_; }
 
   // True if there are many facets and most of them are dead.
-  bool HasManyDead() const {
-    return facets_.size() >= kLeastCompacted && dead_ > facets_.size() / 2;
-  }
+  bool HasManyDead() const { return facets_.size() >= kMinCompacted && dead_ > facets_.size() / 2; }
   // Removes dead facets and preserves the order of live ones. Returns the new index of each facet,
   // kGone if dropped. Cost: O(facets), so amortized O(1) for each facet created.
   static constexpr uint32_t kGone = UINT32_MAX;
@@ -93,7 +91,7 @@ class ExpandingSurface {
   }
 
  private:
-  static constexpr size_t kLeastCompacted = 4096;
+  static constexpr size_t kMinCompacted = 4096;
 
   struct Side {
     uint32_t facet;

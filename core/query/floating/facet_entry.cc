@@ -158,8 +158,8 @@ bool CrossesInside(const FloatPair& start, const RelativePath& path,
   const double of_path = path.displacement.cwiseAbs().maxCoeff();
   // Scaled below `largest`, at most 4 S, the displacement errs by at most 2 u * 32 * 4 S = 2 d, as
   // kDifferencesErrorFactor allows.
-  constexpr double kMostCancelled = 32;
-  if (!(largest > 0) || path.length > kMostCancelled * of_path) return false;
+  constexpr double kMaxCancelled = 32;
+  if (!(largest > 0) || path.length > kMaxCancelled * of_path) return false;
   const double scale = UnitOf(largest) / (2 * UnitOf(of_path));
   const PlainVector d = scale * PlainVector(path.displacement);
   const double position_error = kMinkowskiErrorFactor * start.size();

@@ -27,7 +27,7 @@ constexpr size_t kUsualVertices = 32;
 constexpr size_t kUsualFacets = 192;
 constexpr size_t kMaxVertices = size_t{1} << 18;
 // Maximum number of corners that a lookup scans.
-constexpr size_t kMostScanned = 64;
+constexpr size_t kMaxScanned = 64;
 
 using Corner = MinkowskiVertex<PlainVector>;
 
@@ -131,7 +131,7 @@ class Expansion {
       if (!(length > 0)) return false;
       const PlainVector n = (1 / length) * normal;
       const double distance = std::min(Dot(n, p), std::min(Dot(n, q), Dot(n, r)));
-      planes_[i] = {n, distance, length * distance > kLeastOutward};
+      planes_[i] = {n, distance, length * distance > kMinOutward};
       // A facet beyond the upper bound never becomes the nearest.
       if (distance * unit_ > bounds_.high) continue;
       heap_.emplace_back(distance, i);
@@ -158,7 +158,7 @@ class Expansion {
 
   // Scans a few corners, because a set needs allocations.
   bool Contains(VertexPair pair) {
-    const size_t scanned = std::min(corners_.size(), kMostScanned);
+    const size_t scanned = std::min(corners_.size(), kMaxScanned);
     const bool is_early =
         std::any_of(corners_.begin(), corners_.begin() + static_cast<ptrdiff_t>(scanned),
                     [&](const Corner& corner) { return corner.pair == pair; });
@@ -285,7 +285,7 @@ class Expansion {
   const double unit_;
   const double per_unit_;
   std::vector<Corner> corners_;
-  // Corners from kMostScanned on.
+  // Corners from kMaxScanned on.
   std::unordered_set<uint64_t> late_;
   ExpandingSurface surface_;
   std::vector<Plane> planes_;

@@ -124,36 +124,36 @@ class Walk {
   SeparationBounds bounds_;
 };
 
-template <uint32_t kMostVertices>
+template <uint32_t kMaxVertices>
 SeparationBounds WalkSmallPortably(const FloatPair& pair, const PlainVector& n,
                                    std::span<const VertexPair> start, const SeparationGoal& goal) {
-  const SmallPair<kMostVertices> small(pair);
+  const SmallPair<kMaxVertices> small(pair);
   return Walk(small, goal).Run(n, start);
 }
 
 #ifdef HULLD_HAS_AVX2_PATH
 // The entire call tree is compiled for AVX2, so that lanes stay in registers.
-template <uint32_t kMostVertices>
+template <uint32_t kMaxVertices>
 __attribute__((target("avx2"), flatten)) SeparationBounds WalkSmallAvx2(
     const FloatPair& pair, const PlainVector& n, std::span<const VertexPair> start,
     const SeparationGoal& goal) {
-  const SmallPair<kMostVertices> small(pair);
+  const SmallPair<kMaxVertices> small(pair);
   return Walk(small, goal).Run(n, start);
 }
 #else
-template <uint32_t kMostVertices>
+template <uint32_t kMaxVertices>
 SeparationBounds WalkSmallAvx2(const FloatPair& pair, const PlainVector& n,
                                std::span<const VertexPair> start, const SeparationGoal& goal) {
-  return WalkSmallPortably<kMostVertices>(pair, n, start, goal);
+  return WalkSmallPortably<kMaxVertices>(pair, n, start, goal);
 }
 #endif
 
-template <uint32_t kMostVertices>
+template <uint32_t kMaxVertices>
 SeparationBounds WalkSmall(const FloatPair& pair, const PlainVector& n,
                            std::span<const VertexPair> start, const SeparationGoal& goal) {
   return CurrentSimdPath() == SimdPath::kAvx2
-             ? WalkSmallAvx2<kMostVertices>(pair, n, start, goal)
-             : WalkSmallPortably<kMostVertices>(pair, n, start, goal);
+             ? WalkSmallAvx2<kMaxVertices>(pair, n, start, goal)
+             : WalkSmallPortably<kMaxVertices>(pair, n, start, goal);
 }
 
 }  // namespace

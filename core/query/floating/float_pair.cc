@@ -33,12 +33,12 @@ std::span<const uint32_t> FloatPair::CandidatesOf(const PlacedHull& placed,
                                                   const PlainVector& n_own, double error,
                                                   double slack, CandidateBuffer& buffer) {
   const std::span<const Vector> vertices = placed.query_hull().points_together();
-  if (vertices.empty() || vertices.size() > CandidateBuffer::kMostFew) {
+  if (vertices.empty() || vertices.size() > CandidateBuffer::kCapacity) {
     buffer.many = placed.query_hull().Candidates(n_own, error, slack);
     return buffer.many;
   }
   // Small hulls are scanned here because a list needs an allocation.
-  std::array<double, CandidateBuffer::kMostFew> values;
+  std::array<double, CandidateBuffer::kCapacity> values;
   double largest = -INFINITY;
   for (size_t i = 0; i < vertices.size(); ++i) {
     const Vector& v = vertices[i];

@@ -18,8 +18,8 @@ namespace hulld {
 
 // Storage for lists of candidates; without allocation for small hulls.
 struct CandidateBuffer {
-  static constexpr size_t kMostFew = 64;
-  std::array<uint32_t, kMostFew> few;
+  static constexpr size_t kCapacity = 64;
+  std::array<uint32_t, kCapacity> few;
   std::vector<uint32_t> many;
 };
 

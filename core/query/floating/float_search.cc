@@ -359,34 +359,34 @@ class FloatSearch {
   FloatSearchResult result_;
 };
 
-template <uint32_t kMostVertices>
+template <uint32_t kMaxVertices>
 FloatSearchResult SearchSmallPortably(const FloatPair& pair, double tolerance,
                                       const PlainVector& first) {
-  const SmallPair<kMostVertices> small(pair);
+  const SmallPair<kMaxVertices> small(pair);
   return FloatSearch(small, tolerance).Run(first);
 }
 
 #ifdef HULLD_HAS_AVX2_PATH
 // The entire call tree is compiled for AVX2, so that lanes stay in registers.
-template <uint32_t kMostVertices>
+template <uint32_t kMaxVertices>
 __attribute__((target("avx2"), flatten)) FloatSearchResult SearchSmallAvx2(
     const FloatPair& pair, double tolerance, const PlainVector& first) {
-  const SmallPair<kMostVertices> small(pair);
+  const SmallPair<kMaxVertices> small(pair);
   return FloatSearch(small, tolerance).Run(first);
 }
 #else
-template <uint32_t kMostVertices>
+template <uint32_t kMaxVertices>
 FloatSearchResult SearchSmallAvx2(const FloatPair& pair, double tolerance,
                                   const PlainVector& first) {
-  return SearchSmallPortably<kMostVertices>(pair, tolerance, first);
+  return SearchSmallPortably<kMaxVertices>(pair, tolerance, first);
 }
 #endif
 
-template <uint32_t kMostVertices>
+template <uint32_t kMaxVertices>
 FloatSearchResult SearchSmall(const FloatPair& pair, double tolerance, const PlainVector& first) {
   return CurrentSimdPath() == SimdPath::kAvx2
-             ? SearchSmallAvx2<kMostVertices>(pair, tolerance, first)
-             : SearchSmallPortably<kMostVertices>(pair, tolerance, first);
+             ? SearchSmallAvx2<kMaxVertices>(pair, tolerance, first)
+             : SearchSmallPortably<kMaxVertices>(pair, tolerance, first);
 }
 
 }  // namespace

@@ -12,7 +12,7 @@ namespace hulld {
 namespace {
 
 // Maximum number of support vertices of a cast. More occur only if rounding hinders it. A choice.
-constexpr int kMostSteps = 96;
+constexpr int kMaxSteps = 96;
 // Share of the time up to a plane that its interval leaves open, more than rounding takes. A
 // choice.
 constexpr double kOpenShare = 0x1p-40;
@@ -66,7 +66,7 @@ class Cast {
   // Finds the vertex farthest along n. Returns false if the cast is over.
   bool Explore(const PlainVector& n, Corner& farthest) {
     const double length = Norm(n);
-    if (!(length > 0) || ++steps_ > kMostSteps) return false;
+    if (!(length > 0) || ++steps_ > kMaxSteps) return false;
     const PlainVector unit = (1 / length) * n;
     const FloatPair::Support support = pair_.Farthest(unit);
     farthest = {pair_.Difference(support.pair), support.pair};
@@ -186,31 +186,31 @@ PathCast CastBalls(const FloatPair& start, const RelativePath& path) {
   return cast;
 }
 
-template <uint32_t kMostVertices>
+template <uint32_t kMaxVertices>
 PathCast CastSmallPortably(const FloatPair& start, const RelativePath& path) {
-  const SmallPair<kMostVertices> small(start);
+  const SmallPair<kMaxVertices> small(start);
   return Cast(small, start.CenterDifference(), path).Run();
 }
 
 #ifdef HULLD_HAS_AVX2_PATH
 // The entire call tree is compiled for AVX2, so that lanes stay in registers.
-template <uint32_t kMostVertices>
+template <uint32_t kMaxVertices>
 __attribute__((target("avx2"), flatten)) PathCast CastSmallAvx2(const FloatPair& start,
                                                                 const RelativePath& path) {
-  const SmallPair<kMostVertices> small(start);
+  const SmallPair<kMaxVertices> small(start);
   return Cast(small, start.CenterDifference(), path).Run();
 }
 #else
-template <uint32_t kMostVertices>
+template <uint32_t kMaxVertices>
 PathCast CastSmallAvx2(const FloatPair& start, const RelativePath& path) {
-  return CastSmallPortably<kMostVertices>(start, path);
+  return CastSmallPortably<kMaxVertices>(start, path);
 }
 #endif
 
-template <uint32_t kMostVertices>
+template <uint32_t kMaxVertices>
 PathCast CastSmall(const FloatPair& start, const RelativePath& path) {
-  return CurrentSimdPath() == SimdPath::kAvx2 ? CastSmallAvx2<kMostVertices>(start, path)
-                                              : CastSmallPortably<kMostVertices>(start, path);
+  return CurrentSimdPath() == SimdPath::kAvx2 ? CastSmallAvx2<kMaxVertices>(start, path)
+                                              : CastSmallPortably<kMaxVertices>(start, path);
 }
 
 }  // namespace

@@ -18,18 +18,18 @@ namespace hulld {
 // of A - B is a difference of two known vertices. The farthest vertex is found without a branch,
 // because it is unpredictable.
 //
-// kMostVertices: the maximum number of vertices of either hull; more would need separate bounds
+// kMaxVertices: the maximum number of vertices of either hull; more would need separate bounds
 // (kSupportErrorFactor). Positions have the same bits as in FloatPair. Everything is inlined, so
 // that it is compiled for the registers of the calling search.
-template <uint32_t kMostVertices>
+template <uint32_t kMaxVertices>
 class SmallPair {
-  static_assert(kMostVertices == 8 || kMostVertices == 16);
+  static_assert(kMaxVertices == 8 || kMaxVertices == 16);
 
  public:
   static bool Fits(const FloatPair& pair) {
     const auto fits = [](const QueryHull& hull) {
       const size_t count = hull.points_together().size();
-      return count > 0 && count <= kMostVertices;
+      return count > 0 && count <= kMaxVertices;
     };
     return fits(pair.a().query_hull()) && fits(pair.b().query_hull());
   }
@@ -73,7 +73,7 @@ class SmallPair {
   using Lanes = double __attribute__((vector_size(32)));
   using LaneIds = int64_t __attribute__((vector_size(32)));
   // The low bits of a value, which contain its vertex number.
-  static constexpr int64_t kIdMask = kMostVertices - 1;
+  static constexpr int64_t kIdMask = kMaxVertices - 1;
 
   struct Side {
     // Stores the vertices in the pair's frame, times `sign`; repeats the last one to fill up.
@@ -82,7 +82,7 @@ class SmallPair {
       const std::span<const Vector> vertices = placed.query_hull().points_together();
       last = static_cast<uint32_t>(vertices.size()) - 1;
       const double* const R = placed.R_WH().data();  // column by column
-      for (uint32_t block = 0; block < kMostVertices; block += 4) {
+      for (uint32_t block = 0; block < kMaxVertices; block += 4) {
         const Vector& p0 = vertices[std::min(block, last)];
         const Vector& p1 = vertices[std::min(block + 1, last)];
         const Vector& p2 = vertices[std::min(block + 2, last)];
@@ -107,7 +107,7 @@ class SmallPair {
                                      Lanes& best) const {
       Number(0, n_x, n_y, n_z, best);
 #pragma GCC unroll 4
-      for (uint32_t block = 4; block < kMostVertices; block += 4) {
+      for (uint32_t block = 4; block < kMaxVertices; block += 4) {
         Lanes others;
         Number(block, n_x, n_y, n_z, others);
         best = best > others ? best : others;
@@ -128,9 +128,9 @@ class SmallPair {
       return std::min(static_cast<uint32_t>(numbered & kIdMask), last);
     }
 
-    alignas(32) double x[kMostVertices];
-    alignas(32) double y[kMostVertices];
-    alignas(32) double z[kMostVertices];
+    alignas(32) double x[kMaxVertices];
+    alignas(32) double y[kMaxVertices];
+    alignas(32) double z[kMaxVertices];
     uint32_t last;
   };
 

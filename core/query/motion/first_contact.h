@@ -38,7 +38,7 @@ struct MotionOptions {
   double max_time_error = 0x1p-30;
   // >= 0, length. If the pair rotates and its minimum separation is within this distance of 0, the
   // relation may be kWithinTolerance. Default: kDefaultRelativeResolution times the sizes of the
-  // hulls. Values below kLeastRelativeResolution times the size of the pair are raised to that
+  // hulls. Values below kMinRelativeResolution times the size of the pair are raised to that
   // product.
   std::optional<double> resolution;
   // The search may ignore contacts after this time: if the pair is separated up to some later time,
@@ -58,7 +58,7 @@ inline constexpr double kDefaultRelativeResolution = 1e-9;
 // Minimum MotionOptions::resolution, relative to the sum of the largest absolute coordinates of the
 // hulls and of their translations. Above the rounding errors of planes, which
 // kMotionPlaneErrorFactor bounds. A choice.
-inline constexpr double kLeastRelativeResolution = 0x1p-38;
+inline constexpr double kMinRelativeResolution = 0x1p-38;
 
 // Returns OK, or INVALID_ARGUMENT for a max_time_error outside (0, 1], or a resolution that is
 // negative or NaN.
@@ -80,7 +80,7 @@ struct FirstContact {
   // contact_time itself unless the contact of two translations ends before the next double. The two
   // times are equal or adjacent doubles for translations without radii. Otherwise they are adjacent
   // or at most max_time_error apart. They are farther apart only if the separation at
-  // separated_until is below kLeastRelativeResolution, where planes prove nothing.
+  // separated_until is below kMinRelativeResolution, where planes prove nothing.
   std::optional<double> contact_time;
   // If requested: consecutive intervals from 0 to separated_until. Empty if separated_until is 0 or
   // a hull is empty.

@@ -16,7 +16,7 @@ namespace {
 
 // Pairs that cannot be first are dropped when the number of pairs that met has doubled and is at
 // least this. A choice.
-constexpr size_t kLeastToDrop = 64;
+constexpr size_t kMinToDrop = 64;
 
 std::vector<uint32_t> PiecesOf(const MovingBody& body) {
   std::vector<uint32_t> pieces;
@@ -105,7 +105,7 @@ void MovingBodySearch::TakeUp(const Met& met) {
   }
   earliest_ = std::min(earliest_, met.contact_time);
   met_.push_back(met);
-  if (met_.size() >= std::max(2 * kept_, kLeastToDrop)) DropLater();
+  if (met_.size() >= std::max(2 * kept_, kMinToDrop)) DropLater();
 }
 
 // Drops pairs that are separated up to the earliest contact.

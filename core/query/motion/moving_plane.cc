@@ -22,7 +22,7 @@ using Quaternion = std::array<double, 4>;
 
 // A hull turns too far in an interval if a Bernstein coefficient of |q(t)|^2 is below this factor
 // times the larger |q|^2 at the ends: about 220 degrees if both have the same length. A choice.
-constexpr double kLeastRelativeWeight = 0x1p-4;
+constexpr double kMinRelativeWeight = 0x1p-4;
 
 double LargestOf(const Quaternion& q) {
   return std::max(std::max(std::abs(q[0]), std::abs(q[1])),
@@ -48,7 +48,7 @@ PlainVector TurnedBack(const Quaternion& p, const Quaternion& q, const PlainVect
 }
 
 // Hulls of at most this many points are scanned for several directions at once. A choice.
-constexpr size_t kMostScanned = 16;
+constexpr size_t kMaxScanned = 16;
 
 // Two doubles in a register.
 using Pair = double __attribute__((vector_size(16)));
@@ -87,7 +87,7 @@ template <size_t kCount>
 std::array<double, kCount> ReachAlong(const QueryHull& hull,
                                       const std::array<PlainVector, kCount>& n) {
   const std::span<const Vector> points = hull.points_together();
-  if (!points.empty() && points.size() <= kMostScanned) return ScanAlong(points, n);
+  if (!points.empty() && points.size() <= kMaxScanned) return ScanAlong(points, n);
   std::array<double, kCount> reach;
   for (size_t i = 0; i < kCount; ++i) {
     // Too short to matter in kMotionPlaneErrorFactor.
@@ -222,7 +222,7 @@ const MovingPlane::Frame& MovingPlane::FrameAt(Side& side, double time) {
   frame.time = time;
   frame.q = side.at_rest ? side.q0 : At(side.q0, side.q1, time);
   frame.squared_norm = Dot(frame.q, frame.q);
-  frame.usable = LargestOf(frame.q) >= kInterpolationLeastRemainder;
+  frame.usable = LargestOf(frame.q) >= kInterpolationMinRemainder;
   frame.x = side.x0;
   if (side.at_rest) return frame;
   frame.x.x = Interpolated(side.x0.x(), side.x1.x(), time).high;
@@ -272,7 +272,7 @@ MovingPlane::Bounds::Bounds(Side& side, const PlainVector& n0, const PlainVector
   } else {
     weights_ = Product(norms_, {1, 1, 1});
     for (int i = 0; i < 5; ++i) {
-      if (weights_[i] < kLeastRelativeWeight * weight_) return;
+      if (weights_[i] < kMinRelativeWeight * weight_) return;
       inverse_weights_[i] = 1 / weights_[i];
     }
   }
@@ -332,7 +332,7 @@ void MovingPlane::Bounds::AddMiddle() {
 bool MovingPlane::IsUsableAt(double time) {
   const auto is_usable = [=](Side& side) {
     return side.size <= kMotionMaxSize &&
-           LargestOf(FrameAt(side, time).q) >= 2 * kInterpolationLeastRemainder;
+           LargestOf(FrameAt(side, time).q) >= 2 * kInterpolationMinRemainder;
   };
   return size_ >= kMotionMinSize && is_usable(a_) && is_usable(b_);
 }

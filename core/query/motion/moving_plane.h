@@ -39,7 +39,7 @@ class MovingPlane {
 
   // Returns false if planes may be unprovable from this time on, however far apart the hulls are:
   // their sizes are out of range, or a rotation nearly vanishes (below twice
-  // kInterpolationLeastRemainder).
+  // kInterpolationMinRemainder).
   bool IsUsableAt(double time);
 
   // Return the pose of each moving frame at a time in [0, 1], rounded as in planes, with a
@@ -75,7 +75,7 @@ class MovingPlane {
     std::array<double, 4> q;
     PlainVector x;
     double squared_norm;
-    // False if q is shorter than kInterpolationLeastRemainder.
+    // False if q is shorter than kInterpolationMinRemainder.
     bool usable;
   };
   // The pose of a piece in its body.

@@ -21,27 +21,27 @@ namespace {
 // A step ends when this share of its gap is left, or, once it has made progress, after this many
 // trials. Choices.
 constexpr double kLeftShare = 0x1p-5;
-constexpr int kMostTrials = 10;
+constexpr int kMaxTrials = 10;
 // A plane that turns replaces a constant one if, at the end of the latter, this share of its gap is
 // left along the nearest direction. A choice.
 constexpr double kTurnedShare = 0.25;
 // A plane turns by less than 60 degrees, so that its normal, linear in time, keeps more than 0.86
 // of its length. A choice.
-constexpr double kLeastCosine = 0.5;
+constexpr double kMinCosine = 0.5;
 // Trials keep this share of an interval away from its ends. A choice.
-constexpr double kLeastShare = 0x1p-4;
+constexpr double kMinShare = 0x1p-4;
 // Share of the last step over which the rate of the gap is measured. A choice.
 constexpr double kRateShare = 0x1p-10;
 // A leap leaves at least this share of the distance to the likely contact, and this multiple of the
 // error expected from that of the last one. Choices.
-constexpr double kLeastLeftShare = 0x1p-20;
+constexpr double kMinLeftShare = 0x1p-20;
 constexpr double kLeapSlack = 8;
 // A bracket below this width is narrow. A choice.
 constexpr double kNarrowBracket = 0x1p-20;
 // Maximum number of times at which a passage is cut, and minimum share of an interval on either
 // side of a cut. Choices.
-constexpr int kMostCuts = 10;
-constexpr double kLeastCutShare = 0x1p-5;
+constexpr int kMaxCuts = 10;
+constexpr double kMinCutShare = 0x1p-5;
 // Two directions count as equal if the gaps along them differ by less than this share. A choice.
 constexpr double kSameShare = 0x1p-6;
 // Factor between the lengths of successive steps, at first trial. A choice.
@@ -54,16 +54,16 @@ constexpr double kExactShare = 0x1p-36;
 constexpr double kPoorShare = 0x1p-8;
 // An exact direction is expensive: only this many trials of a step compute one at their end, and
 // steps below this length or this share of the last one, whichever is less, are abandoned. Choices.
-constexpr int kMostExactTrials = 10;
+constexpr int kMaxExactTrials = 10;
 constexpr double kShortestExactStep = 0x1p-40;
 constexpr double kShortestExactShare = 0x1p-12;
 // After the search is stuck, and before it tries tolerable planes, it looks for a contact at this
 // many times, each farther away by this factor. Choices.
-constexpr int kMostSoonTimes = 8;
+constexpr int kMaxSoonTimes = 8;
 constexpr double kSoonGrowth = 4;
 // Before the search is stuck, it does not try tolerable steps below this share of the last length.
 // A choice.
-constexpr double kLeastTolerableShare = 0x1p-8;
+constexpr double kMinTolerableShare = 0x1p-8;
 
 // Returns a time between `proven`, where a plane is proven with `gap`, and `failed`, where it is
 // not, with `failed_gap`: shortly before the gap would close. The loss of a plane is linear in time
@@ -73,7 +73,7 @@ double TrialBetween(double proven, double gap, double failed, double failed_gap,
   const double lost = gap / (gap - failed_gap);
   const double share = (turned ? std::sqrt(lost) : lost) * (1 - kLeftShare / 2);
   if (!(share > 0)) return proven + length / 2;
-  return proven + length * std::clamp(share, kLeastShare, 1 - kLeastShare);
+  return proven + length * std::clamp(share, kMinShare, 1 - kMinShare);
 }
 
 // Returns a unit direction within 54 degrees of m: n, or else the direction between m and n that is
@@ -81,12 +81,12 @@ double TrialBetween(double proven, double gap, double failed, double failed_gap,
 Vector TurnedToward(const PlainVector& m, const PlainVector& n) {
   constexpr double kCosine = 0.6;
   constexpr double kSine = 0.8;
-  constexpr double kLeastSine = 0x1p-4;
+  constexpr double kMinSine = 0x1p-4;
   const double cosine = Dot(m, n);
   if (cosine >= kCosine) return n;
   const PlainVector across = n - cosine * m;
   const double sine = Norm(across);
-  if (!(sine > kLeastSine)) return m;
+  if (!(sine > kMinSine)) return m;
   const PlainVector turned = kCosine * m + kSine / sine * across;
   return 1 / Norm(turned) * turned;
 }
@@ -108,7 +108,7 @@ TurningSearch::TurningSearch(const MovingHull& a, const MovingHull& b, const Mot
   };
   const double sizes = size_of(a) + size_of(b);
   resolution_ = std::max(options.resolution.value_or(kDefaultRelativeResolution * sizes),
-                         kLeastRelativeResolution * plane_.size());
+                         kMinRelativeResolution * plane_.size());
 }
 
 absl::StatusOr<FirstContact> TurningSearch::Run() {
@@ -188,12 +188,12 @@ absl::Status TurningSearch::ProvePassage() {
   direction_ = from->direction;
   is_nearest_ = true;
   if (!(from->gap > 0)) return absl::OkStatus();
-  std::array<Ahead, kMostCuts + 1> ahead;
+  std::array<Ahead, kMaxCuts + 1> ahead;
   size_t count = 0;
   // Independent of options_.latest, so that searches with different latest times take the same
   // steps.
   double next = 1;
-  for (int cuts = 0; cuts <= kMostCuts; ++cuts) {
+  for (int cuts = 0; cuts <= kMaxCuts; ++cuts) {
     if (poll_.Step()) return MotionStopped();
     absl::StatusOr<Ahead> to = LookAt(next);
     if (!to.ok()) return to.status();
@@ -249,7 +249,7 @@ std::optional<double> TurningSearch::CutOf(const Ahead& from, const Ahead& to) {
     const double curvature = gap_at_end - from.gap - rate;
     if (rate < 0 && curvature > 0) share = -rate / (2 * curvature);
   }
-  return from.time + std::clamp(share, kLeastCutShare, 1 - kLeastCutShare) * length;
+  return from.time + std::clamp(share, kMinCutShare, 1 - kMinCutShare) * length;
 }
 
 absl::StatusOr<Relation> TurningSearch::RelationAt(double time) const {
@@ -279,7 +279,7 @@ absl::StatusOr<TurningSearch::Plane> TurningSearch::TryPlane(const Vector& n, do
   if (plane.found.proven || !turns) return plane;
   const absl::StatusOr<Vector> at_end = DirectionAt(end);
   if (!at_end.ok()) return at_end.status();
-  if (!(n.dot(*at_end) > kLeastCosine)) return plane;
+  if (!(n.dot(*at_end) > kMinCosine)) return plane;
   const MovingPlane::Result turned = plane_.Try(n, *at_end, start, end, margin);
   if (turned.gap > plane.found.gap) plane = {turned, *at_end};
   return plane;
@@ -323,14 +323,13 @@ absl::StatusOr<std::optional<TurningSearch::Step>> TurningSearch::LeapTo(double 
   if (leap_length_ > 0) {
     // The error of a parabola, as a share of the length, falls at least linearly with the length.
     const double error = std::abs(contact - likely_contact_) / leap_length_;
-    share =
-        std::min(share, std::max(kLeapSlack * error * (length / leap_length_), kLeastLeftShare));
+    share = std::min(share, std::max(kLeapSlack * error * (length / leap_length_), kMinLeftShare));
   }
   const double until = contact - std::max(share * length, options_.max_time_error / 4);
   if (!(until > separated_ && until <= 1)) return std::nullopt;
   const absl::StatusOr<Vector> at_end = DirectionAt(until);
   if (!at_end.ok()) return at_end.status();
-  if (!(n.dot(*at_end) > kLeastCosine)) return std::nullopt;
+  if (!(n.dot(*at_end) > kMinCosine)) return std::nullopt;
   const MovingPlane::Result turned = plane_.Try(n, *at_end, separated_, until);
   // Past a graze, the gap does not nearly close.
   if (!turned.proven || turned.end_gap > 4 * kLeftShare * gap) return std::nullopt;
@@ -365,10 +364,10 @@ absl::StatusOr<std::optional<TurningSearch::Step>> TurningSearch::FindStep(const
   double trial = std::min(1.0, separated_ + kGrowth * last_length_);
   if (contact_ > separated_) trial = std::min(trial, contact_);
   const double shortest = std::min(kShortestExactStep, kShortestExactShare * last_length_);
-  for (int i = 0; i < kMostTrials || step.until == separated_; ++i) {
+  for (int i = 0; i < kMaxTrials || step.until == separated_; ++i) {
     if (!(trial > step.until) || trial == step.failed) break;
     if (exact_ && trial - separated_ < shortest) break;
-    const bool turns = turns_ && (!exact_ || i < kMostExactTrials);
+    const bool turns = turns_ && (!exact_ || i < kMaxExactTrials);
     const absl::StatusOr<Plane> plane = TryPlane(n, separated_, trial, turns);
     if (!plane.ok()) return plane.status();
     if (plane->found.proven) {
@@ -424,7 +423,7 @@ absl::StatusOr<double> TurningSearch::TolerableUntil(bool thorough) {
   double time = separated_;
   double length = last_length_;
   const double shortest =
-      thorough ? kShortestStep : std::max(kShortestStep, kLeastTolerableShare * last_length_);
+      thorough ? kShortestStep : std::max(kShortestStep, kMinTolerableShare * last_length_);
   while (time < 1) {
     if (poll_.Step()) return MotionStopped();
     double until = std::min(1.0, time + kGrowth * length);
@@ -498,7 +497,7 @@ absl::StatusOr<FirstContact> TurningSearch::ConcludeStuck() {
 // resolution.
 absl::StatusOr<double> TurningSearch::FindContactSoon(double latest) const {
   double time = latest;
-  for (int i = 0; i < kMostSoonTimes && time < 1; ++i) {
+  for (int i = 0; i < kMaxSoonTimes && time < 1; ++i) {
     const absl::StatusOr<bool> near =
         PairAt(a_, b_, time).IsWithin(resolution_, options_.should_stop);
     if (!near.ok()) return near.status();

@@ -22,21 +22,21 @@ constexpr uint32_t kFineSide = 8;
 static_assert(kFineSide * kFineSide <= 64);
 uint32_t SideFor(size_t vertices) { return vertices < 24 ? kCoarseSide : kFineSide; }
 // With more cells than this along a side, the gauge is computed only at every other corner.
-constexpr uint32_t kMostGaugedCells = 4;
+constexpr uint32_t kMaxGaugedCells = 4;
 
 // Trial points on a ray, relative to the length of the ray within the hull.
 constexpr double kShrink[] = {1 - 0x1p-22, 1 - 0x1p-16, 1 - 0x1p-10};
 // A portal is as good as a facet if the hull exceeds its plane by less than this, relative to its
 // distance, because the bounds between corners are no tighter.
-constexpr double kLeastGain = 0x1p-8;
+constexpr double kMinGain = 0x1p-8;
 // Far more than needed. Observed on 64 to 10000 points of a sphere, even with a gain of 2^-26: one
 // step to find a portal, and 5 to 13 to refine it.
-constexpr int kMostSteps = 64;
+constexpr int kMaxSteps = 64;
 
 // Approximate angle between the directions that guess a portal, times the square root of the number
-// of points: the spacing of points on a sphere. kMostTilt limits the angle.
+// of points: the spacing of points on a sphere. kMaxTilt limits the angle.
 constexpr double kTilt = 4;
-constexpr double kMostTilt = 0.7;
+constexpr double kMaxTilt = 0.7;
 
 float RoundedUp(double value) {
   const auto rounded = static_cast<float>(value);
@@ -114,7 +114,7 @@ class Lookout {
       : points_(points),
         o_(o),
         support_(support),
-        tilt_(std::min(kMostTilt, kTilt / std::sqrt(static_cast<double>(points.size())))),
+        tilt_(std::min(kMaxTilt, kTilt / std::sqrt(static_cast<double>(points.size())))),
         per_width_(per_width) {}
 
   // Returns true if o is in the hull: exactly in a tetrahedron of its points. May return false for
@@ -127,7 +127,7 @@ class Lookout {
     const double side = n.dot(o_ - t[0]);
     t[3] = side == 0 ? FartherOf(n, t[0]) : Farthest(side > 0 ? n : Vector(-n));
     // Walks through a face that has o beyond it, while one exists.
-    for (int step = 0; step < kMostSteps; ++step) {
+    for (int step = 0; step < kMaxSteps; ++step) {
       if (IsInTetrahedron(t, o_)) return true;
       double farthest = 0;
       int off = -1;
@@ -231,7 +231,7 @@ class Lookout {
     if (!(LargestComponent(n) > 0x1p-40 * LargestComponent(p_))) n = AnyPerpendicularTo(d);
     LookUp(-n, 1, q_);
     LookUp(n, 2, r_);
-    for (int step = 0; step < kMostSteps; ++step) {
+    for (int step = 0; step < kMaxSteps; ++step) {
       n = Cross(r_, q_);
       if (Dot(n, d) <= 0) return found_ = true;
       const uint32_t id = support_.Farthest(n).vertex;
@@ -246,14 +246,14 @@ class Lookout {
 
   // Moves the portal outwards until it is approximately a facet.
   bool RefinePortal(const PlainVector& d) {
-    for (int step = 0; step < kMostSteps; ++step) {
+    for (int step = 0; step < kMaxSteps; ++step) {
       const PlainVector n = NormalOfPortal();
       // Negative while the opposite ray passes through the portal.
       const double height = Dot(n, p_);
       const uint32_t id = support_.Farthest(n).vertex;
       const PlainVector w = From(id);
       const double gain = Dot(n, w) - height;
-      if (!(gain > kLeastGain * std::abs(height))) return height > 0;
+      if (!(gain > kMinGain * std::abs(height))) return height > 0;
       const double by_p = Turn(p_, w, d);
       const double by_q = Turn(q_, w, d);
       const double by_r = Turn(r_, w, d);
@@ -298,7 +298,7 @@ CenterBounds::CenterBounds(std::span<const Vector> points, int dimension, const 
   // Such radii exceed the range of pairs, or are so small relative to the coordinates that rounding
   // matters.
   if (!IsFilterSize(radius)) return;
-  if (radius < kCenterLeastRadius * max_abs) return;
+  if (radius < kCenterMinRadius * max_abs) return;
   side_ = SideFor(points.size());
   half_ = 0.5 * side_;
   unit_ = std::ldexp(1.0, std::ilogb(radius));
@@ -339,7 +339,7 @@ void CenterBounds::Begin() const {
     const auto sign = [octant](uint32_t axis) { return (octant >> axis & 1) == 0 ? 1.0 : -1.0; };
     least = std::min(least, lookout.Reach(Vector(sign(0), sign(1), sign(2))));
     // The center is strictly inside only if it is surrounded, up to rounding.
-    if (!(least > 0 && least >= kCenterLeastRadius * map_->max_abs)) return;
+    if (!(least > 0 && least >= kCenterMinRadius * map_->max_abs)) return;
   }
   map_->largest_gauge = (1 + kCenterMargin) / least;
 }
@@ -362,7 +362,7 @@ float CenterBounds::MakeGauge(uint32_t corner) const {
   float& gauge = corners[corner].gauge;
   if (!std::isnan(gauge)) return gauge;
   const uint32_t row = side_ + 1;
-  if (side_ > kMostGaugedCells) {
+  if (side_ > kMaxGaugedCells) {
     const uint32_t down = corner / row % row % 2 * row;
     const uint32_t right = corner % row % 2;
     if (down != 0 || right != 0) return gauge = MeanGauge(corner, down, right);

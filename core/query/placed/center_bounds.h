@@ -75,7 +75,7 @@ class CenterBounds {
   PlainVector NormalAt(const Place& place) const;
   // True if there are few corners or none. The bounds then help only with points deep inside, and
   // the normals are useless.
-  bool coarse() const { return side_ < kLeastFineSide; }
+  bool coarse() const { return side_ < kMinFineSide; }
   // At least g(d) for all d with components of at most 1; infinite if unknown. Requires: this
   // thread has obtained a known place.
   double largest_gauge() const {
@@ -90,7 +90,7 @@ class CenterBounds {
 
  private:
   // Cells along a side of a face. Observed: guessing a normal from fewer does not pay off.
-  static constexpr uint32_t kLeastFineSide = 4;
+  static constexpr uint32_t kMinFineSide = 4;
   // Values for directions with largest component 1: the support function in units, and the gauge
   // per unit.
   struct Corner {

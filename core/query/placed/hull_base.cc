@@ -16,9 +16,9 @@ double RadiusTo(const Vector& difference) {
   constexpr double kRootOfThree = 1.7320508075688774;
   const double square = difference.squaredNorm();
   if (square > kRadiusSquareMin && square < kLargestDouble) {
-    return std::sqrt(square) * kRadiusRoundUp + kLeastPositive;
+    return std::sqrt(square) * kRadiusRoundUp + kMinPositive;
   }
-  return kRootOfThree * difference.cwiseAbs().maxCoeff() * kRadiusRoundUp + kLeastPositive;
+  return kRootOfThree * difference.cwiseAbs().maxCoeff() * kRadiusRoundUp + kMinPositive;
 }
 
 HullBase::HullBase(const Hull& hull, const std::function<bool()>& should_stop)

@@ -15,34 +15,34 @@ namespace hulld {
 namespace {
 
 // Sets of up to this many points are scanned: ten blocks of four. A choice, not tuned.
-constexpr size_t kMostScanned = 40;
+constexpr size_t kMaxScanned = 40;
 // Cells of the cube map per point. A choice: with two, of 16 bytes each, most cells list at most
 // four points.
 constexpr double kCellsPerPoint = 2;
 // Cells with more points than this are divided.
-constexpr size_t kMostListed = 12;
+constexpr size_t kMaxListed = 12;
 // Lists of at most this many points are compared pairwise.
-constexpr size_t kMostCompared = 16;
+constexpr size_t kMaxCompared = 16;
 // Minimum width of a cell; far wider than kCellMargin. Observed: points this close to a common
 // plane come from rounding, and a list of them is as good as a finer division.
-constexpr double kLeastWidth = 0x1p-22;
+constexpr double kMinWidth = 0x1p-22;
 // Cells per point beyond which no further cell is divided.
-constexpr size_t kMostCellsPerPoint = 8;
+constexpr size_t kMaxCellsPerPoint = 8;
 // Limit on the estimated number of times that each point is listed in the parts of the enclosing
-// squares. Beyond it, a square with more points than kMostCompared gets no list. Observed: 8 on
+// squares. Beyond it, a square with more points than kMaxCompared gets no list. Observed: 8 on
 // average for points all over a surface. The bound is for points along curves, where the number
 // doubles with every second division of a square.
-constexpr double kMostCopies = 64;
+constexpr double kMaxCopies = 64;
 // Sets of up to this many points get only lists: because the number of copies grows with the square
 // root of the number of points, a tree saves nothing.
-constexpr size_t kMostWithoutTree = 4096;
+constexpr size_t kMaxPointsWithoutTree = 4096;
 // Fraction of candidates among all points beyond which scanning all is faster than sorting the
 // candidates.
 constexpr size_t kPointsPerCandidate = 16;
 // Sets with coordinates beyond these limits are scanned: products might overflow or underflow
 // significantly.
 constexpr double kLargestCoordinate = 0x1p900;
-constexpr double kLeastExtent = 0x1p-800;
+constexpr double kMinExtent = 0x1p-800;
 
 using Lanes = double __attribute__((vector_size(32)));
 
@@ -59,14 +59,14 @@ using Lanes = double __attribute__((vector_size(32)));
 // Returns powers of two that make the extents of the points roughly equal: the size along each
 // axis relative to the largest, at least 2^-10.
 Vector ScaleOf(const Vector& extents) {
-  constexpr int kLeast = -10;
+  constexpr int kMin = -10;
   int exponents[3];
   for (int i = 0; i < 3; ++i) {
-    exponents[i] = extents[i] > 0 ? std::ilogb(extents[i]) : kLeast - 2000;
+    exponents[i] = extents[i] > 0 ? std::ilogb(extents[i]) : kMin - 2000;
   }
   const int largest = *std::max_element(exponents, exponents + 3);
   Vector scale;
-  for (int i = 0; i < 3; ++i) scale[i] = std::ldexp(1.0, std::max(exponents[i] - largest, kLeast));
+  for (int i = 0; i < 3; ++i) scale[i] = std::ldexp(1.0, std::max(exponents[i] - largest, kMin));
   return scale;
 }
 
@@ -229,12 +229,12 @@ void Filter(const FacePoints& from, const Square& square, double bound, FacePoin
 class SupportMap::Filling {
  public:
   Filling(SupportMap& map, StopPoll& poll)
-      : map_(map), poll_(poll), may_need_tree_(map.points_.size() > kMostWithoutTree) {}
+      : map_(map), poll_(poll), may_need_tree_(map.points_.size() > kMaxPointsWithoutTree) {}
 
   // `bound`: see Filter. The cells are incomplete if stopped.
   void Fill(double bound) {
     bound_ = bound;
-    most_cells_ = map_.cells_.size() + kMostCellsPerPoint * map_.points_.size();
+    max_cells_ = map_.cells_.size() + kMaxCellsPerPoint * map_.points_.size();
     const uint32_t side = map_.side_;
     for (uint32_t face = 0; face < 6 && !poll_.stopped(); ++face) {
       SeeFrom(face);
@@ -305,7 +305,7 @@ class SupportMap::Filling {
   // Frees a long list that is no longer needed. Without this, a set with many points in one cell
   // needs a copy of them for each division.
   static void Release(FacePoints& list) {
-    if (list.size > kMostKept) list = FacePoints();
+    if (list.size > kMaxKept) list = FacePoints();
   }
 
   // Fills the cells of a range, given a superset of their farthest points.
@@ -324,7 +324,7 @@ class SupportMap::Filling {
     const uint32_t rows = range.i_end - range.i_begin;
     const uint32_t columns = range.j_end - range.j_begin;
     if (found.size <= 4) return FillAll(found, grid, range);
-    if (may_need_tree_ && found.size > kMostCompared && copies > kMostCopies) {
+    if (may_need_tree_ && found.size > kMaxCompared && copies > kMaxCopies) {
       LeaveToTree(grid, range);
       return Release(found);
     }
@@ -367,11 +367,11 @@ class SupportMap::Filling {
 
   void FillCell(FacePoints& found, const Grid& grid, const Range& range, size_t depth,
                 double copies) {
-    if (found.size <= kMostCompared) CompareEach(found, Widened(grid, range));
+    if (found.size <= kMaxCompared) CompareEach(found, Widened(grid, range));
     if (found.size <= 4) return FillAll(found, grid, range);
     Cell& cell = map_.cells_[grid.first + range.i_begin * grid.side + range.j_begin];
-    const bool divides = found.size > kMostListed && grid.width > 2 * kLeastWidth &&
-                         map_.cells_.size() < most_cells_;
+    const bool divides =
+        found.size > kMaxListed && grid.width > 2 * kMinWidth && map_.cells_.size() < max_cells_;
     // Beyond this, ids of points, lists and parts would be ambiguous.
     HULLD_CHECK(map_.cells_.size() < kDivided - kLong && map_.lists_.size() < kNoList - kLong);
     if (!divides) {
@@ -416,13 +416,13 @@ class SupportMap::Filling {
   // Filtering this many points takes about 10 us.
   static constexpr size_t kPointsPerStep = 4096;
   // Lists of at most this many points keep their memory for reuse.
-  static constexpr size_t kMostKept = 4096;
+  static constexpr size_t kMaxKept = 4096;
 
   SupportMap& map_;
   StopPoll& poll_;
   const bool may_need_tree_;
   double bound_ = 0;
-  size_t most_cells_ = 0;
+  size_t max_cells_ = 0;
   // All points, as seen on the face being filled.
   FacePoints seen_;
   // The result of the last filter.
@@ -441,7 +441,7 @@ SupportMap SupportMap::ForScanning(std::span<const Vector> points) {
 SupportMap::SupportMap(std::span<const Vector> points, const std::function<bool()>& should_stop)
     : points_(points) {
   HULLD_CHECK(points_.size() < kLong);
-  if (points_.size() <= kMostScanned) {
+  if (points_.size() <= kMaxScanned) {
     BuildBlocks();
     return;
   }
@@ -453,7 +453,7 @@ SupportMap::SupportMap(std::span<const Vector> points, const std::function<bool(
   }
   const double largest = std::max(low.cwiseAbs().maxCoeff(), high.cwiseAbs().maxCoeff());
   const Vector extents = largest <= kLargestCoordinate ? Vector(high - low) : Vector::Zero();
-  if (!(extents.maxCoeff() >= kLeastExtent)) {
+  if (!(extents.maxCoeff() >= kMinExtent)) {
     BuildBlocks();
     return;
   }

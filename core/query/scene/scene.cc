@@ -23,13 +23,13 @@ namespace {
 // to keep the threads busy.
 constexpr uint64_t kCandidatesPerWindow = 16384;
 constexpr uint32_t kFirstPlacements = 16;
-constexpr uint32_t kMostPlacements = 1024;
+constexpr uint32_t kMaxPlacements = 1024;
 // Pairs per task of a thread: a few microseconds of work.
 constexpr size_t kPairsPerTask = 64;
 // Tree nodes visited between two polls.
 constexpr uint64_t kNodesPerPoll = 1024;
 // Beyond this many candidates, a bit set of all placements takes less memory.
-constexpr size_t kMostListed = 1024;
+constexpr size_t kMaxListed = 1024;
 constexpr size_t kWordBits = 64;
 
 // Results of a thread.
@@ -45,11 +45,11 @@ class Search {
   Search(const SceneSearch& scene, const SceneOptions& options)
       : scene_(scene), options_(options), threads_(std::max(1, options.threads)) {
     totals_.pairs = scene.pairs();
-    pairs_.reserve(kMostEmittedAnswers);
+    pairs_.reserve(kMaxEmittedAnswers);
   }
 
   absl::StatusOr<SceneTotals> Run(const std::function<void(std::span<const SceneAnswer>)>& emit) {
-    std::vector<SceneCandidates> window(kMostPlacements);
+    std::vector<SceneCandidates> window(kMaxPlacements);
     uint32_t width = kFirstPlacements;
     for (uint32_t begin = 0, size = 0; begin < scene_.size(); begin += size) {
       size = std::min(width, scene_.size() - begin);
@@ -58,13 +58,13 @@ class Search {
       for (uint32_t i = 0; i < size && !Stopped(); ++i) {
         while (const std::optional<uint32_t> b = window[i].Next()) {
           pairs_.push_back({begin + i, *b});
-          if (pairs_.size() == kMostEmittedAnswers && !AskAndEmit(emit)) break;
+          if (pairs_.size() == kMaxEmittedAnswers && !AskAndEmit(emit)) break;
         }
       }
       if (Stopped() || !AskAndEmit(emit)) return absl::CancelledError("stopped in a scene");
       const uint64_t candidates = std::max<uint64_t>(totals_.candidates - before, 1);
       width = static_cast<uint32_t>(std::clamp<uint64_t>(kCandidatesPerWindow * size / candidates,
-                                                         1, std::min(2 * size, kMostPlacements)));
+                                                         1, std::min(2 * size, kMaxPlacements)));
     }
     return totals_;
   }
@@ -204,7 +204,7 @@ absl::StatusOr<SceneSearch> SceneSearch::MakeWith(std::span<const PlacedHull> pl
                                                   std::optional<std::vector<Box>> boxes,
                                                   std::vector<MovingBox> moving) {
   if (!options.groups.empty() && options.groups.size() != placements.size()) {
-    return absl::InvalidArgumentError(absl::StrCat("groups holds ", options.groups.size(),
+    return absl::InvalidArgumentError(absl::StrCat("groups has ", options.groups.size(),
                                                    " groups for ", placements.size(),
                                                    " placements; set one per placement, or none"));
   }
@@ -329,7 +329,7 @@ bool SceneCandidates::Gather(uint64_t nodes) {
   listed_.erase(
       std::remove_if(listed_.begin() + static_cast<ptrdiff_t>(before), listed_.end(), is_ignored),
       listed_.end());
-  if (listed_.size() > kMostListed && !is_marked_) {
+  if (listed_.size() > kMaxListed && !is_marked_) {
     marked_.assign(scene_->placements_.size() / kWordBits + 1, 0);
     is_marked_ = true;
   }

@@ -194,12 +194,12 @@ class SceneCandidates {
 
 // Maximum number of answers that FindCollisions buffers. A choice: three to four MiB with
 // certificates, and enough for many threads.
-inline constexpr size_t kMostEmittedAnswers = 4096;
+inline constexpr size_t kMaxEmittedAnswers = 4096;
 
 // Finds all colliding pairs of placements. A tree of bounding boxes yields the pairs with
 // intersecting boxes, and each of these is answered like CheckCollision. Calls `emit` on the
 // calling thread, in ascending order of (a, b); neither the answers nor their order depend on the
-// number of threads. `emit` may block, which throttles the search. At most kMostEmittedAnswers
+// number of threads. `emit` may block, which throttles the search. At most kMaxEmittedAnswers
 // answers are buffered, for any number of collisions. INVALID_ARGUMENT: `groups` is not empty and
 // does not have one entry per placement. CANCELLED: should_stop returned true; answers emitted
 // before remain valid. Cost: O(n log n) plus the candidates.

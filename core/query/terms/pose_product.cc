@@ -27,7 +27,7 @@ DoubleDouble Times(const DoubleDouble& x, const DoubleDouble& y) { return x * y;
 bool IsScalar(const Quaternion& q) { return q[1] == 0 && q[2] == 0 && q[3] == 0; }
 
 // Scales q, without changing the rotation, so that its largest component is in [1/2, 1). Omits
-// components too small to matter (kProductLeastComponent).
+// components too small to matter (kProductMinComponent).
 Quaternion Scaled(const Quaternion& q) {
   double largest = 0;
   for (const double component : q) largest = std::max(largest, std::abs(component));
@@ -36,7 +36,7 @@ Quaternion Scaled(const Quaternion& q) {
   Quaternion scaled;
   for (int i = 0; i < 4; ++i) {
     const double component = std::ldexp(q[i], -exponent);
-    scaled[i] = std::abs(component) < kProductLeastComponent ? 0 : component;
+    scaled[i] = std::abs(component) < kProductMinComponent ? 0 : component;
   }
   return scaled;
 }
@@ -112,7 +112,7 @@ LongQuaternion CutAt(const Motion& motion, double time) {
 }
 
 // Returns the quaternion of a motion at a time, scaled by a positive number. Components are below 2
-// and err by at most 18 u^2; the largest is at least kInterpolationLeastRemainder.
+// and err by at most 18 u^2; the largest is at least kInterpolationMinRemainder.
 LongQuaternion InterpolatedAt(const Motion& motion, double time) {
   const Quaternion& q0 = motion.start.q;
   const Quaternion& q1 = motion.end.q;
@@ -124,7 +124,7 @@ LongQuaternion InterpolatedAt(const Motion& motion, double time) {
   for (int i = 0; i < 4; ++i) {
     q[i] = Interpolated(std::ldexp(q0[i], -exponent), std::ldexp(q1[i], -exponent), time);
   }
-  if (LargestOf(q) < kInterpolationLeastRemainder) q = CutAt(motion, time);
+  if (LargestOf(q) < kInterpolationMinRemainder) q = CutAt(motion, time);
   return q;
 }
 

@@ -11,7 +11,7 @@ namespace hulld::server {
 namespace {
 
 // Up to this many placements are compared with all others; for more, a tree costs less.
-constexpr size_t kMostCompared = 16;
+constexpr size_t kMaxCompared = 16;
 
 uint64_t KeyOf(uint32_t a, uint32_t b) { return uint64_t{a} << 32 | b; }
 
@@ -91,7 +91,7 @@ absl::Status LivePairs::Select(std::span<const uint32_t> changed, const Placemen
 }
 
 absl::Status LivePairs::SelectNeighbors(std::span<const uint32_t> changed) {
-  if (changed.size() <= kMostCompared) {
+  if (changed.size() <= kMaxCompared) {
     for (const uint32_t a : changed) {
       const Box box = GrownBy(boxes_[a], clearance_);
       for (uint32_t b = 0; b < boxes_.size(); ++b) {

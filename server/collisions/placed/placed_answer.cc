@@ -90,11 +90,11 @@ size_t AddProvenAnswer(const PlacementTable& table, uint32_t a, uint32_t b,
 
 absl::Status PairSearch::CheckMemory(Registry& registry) const {
   // About 400 bytes each.
-  constexpr size_t kMostVertices = 4096;
+  constexpr size_t kMaxVertices = 4096;
   if (options_.method != Method::kTextbookSat || HasBody(table_, a_, b_)) return absl::OkStatus();
   const size_t vertices =
       table_.placed()[a_].hull().vertices().size() + table_.placed()[b_].hull().vertices().size();
-  return vertices > kMostVertices ? registry.CheckMemory(MemoryUse::kReading) : absl::OkStatus();
+  return vertices > kMaxVertices ? registry.CheckMemory(MemoryUse::kReading) : absl::OkStatus();
 }
 
 bool PairSearch::Advance(Clock::time_point end) {

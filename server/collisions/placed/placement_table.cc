@@ -68,7 +68,7 @@ size_t ErrorBytes(const absl::Status& status) {
 
 absl::Status CheckCount(int count, const char* of, uint64_t max_placements, const char* what) {
   if (static_cast<uint64_t>(count) <= max_placements) return absl::OkStatus();
-  return LimitExceeded(absl::StrCat(what, " holds ", count, of), max_placements, "max-placements");
+  return LimitExceeded(absl::StrCat(what, " has ", count, of), max_placements, "max-placements");
 }
 
 // INVALID_ARGUMENT: the lists do not match.
@@ -76,17 +76,17 @@ absl::Status CheckPacked(const v1::PackedPlacements& packed) {
   if (packed.poses_size() / kPoseNumbers != packed.hulls_size() ||
       packed.poses_size() % kPoseNumbers != 0) {
     return absl::InvalidArgumentError(
-        absl::StrCat("packed_placements.poses holds ", packed.poses_size(), " numbers for ",
+        absl::StrCat("packed_placements.poses has ", packed.poses_size(), " numbers for ",
                      packed.hulls_size(), " placements; each needs seven: w x y z and x y z"));
   }
   if (!packed.radii().empty() && packed.radii_size() != packed.hulls_size()) {
     return absl::InvalidArgumentError(
-        absl::StrCat("packed_placements.radii holds ", packed.radii_size(), " numbers for ",
+        absl::StrCat("packed_placements.radii has ", packed.radii_size(), " numbers for ",
                      packed.hulls_size(), " placements; give one for each, or none"));
   }
   if (!packed.end_poses().empty() && packed.end_poses_size() != packed.poses_size()) {
     return absl::InvalidArgumentError(
-        absl::StrCat("packed_placements.end_poses holds ", packed.end_poses_size(), " numbers for ",
+        absl::StrCat("packed_placements.end_poses has ", packed.end_poses_size(), " numbers for ",
                      packed.hulls_size(), " placements; set seven for each, or none"));
   }
   const auto shapes = static_cast<uint32_t>(packed.shape_sizes_size());
@@ -95,7 +95,7 @@ absl::Status CheckPacked(const v1::PackedPlacements& packed) {
     if (packed.hulls(i) >= hulls) {
       return absl::InvalidArgumentError(absl::StrCat(
           "packed_placements.hulls[", i, "] is ", packed.hulls(i),
-          ", but packed_placements.hull_ids holds ", packed.hull_ids_size(),
+          ", but packed_placements.hull_ids has ", packed.hull_ids_size(),
           shapes == 0 ? "" : absl::StrCat(" and shape_sizes ", shapes), "; indices start at 0"));
     }
   }
@@ -124,8 +124,7 @@ absl::StatusOr<std::vector<Vector>> DecodeShapePoints(const v1::PackedPlacements
       std::accumulate(packed.shape_sizes().begin(), packed.shape_sizes().end(), uint64_t{0});
   if (sum == points->size()) return points;
   return absl::InvalidArgumentError(absl::StrCat("packed_placements.shape_sizes add up to ", sum,
-                                                 " points, but shape_points holds ",
-                                                 points->size()));
+                                                 " points, but shape_points has ", points->size()));
 }
 
 }  // namespace
@@ -583,14 +582,14 @@ absl::Status RefuseMotions(const google::protobuf::RepeatedPtrField<v1::Placemen
           : absl::StrCat("placements[", moving - placements.begin(), "].end_pose");
   return absl::InvalidArgumentError(absl::StrCat(
       field, " is set, but ", what,
-      " takes no motions; use CheckCollision, BatchCheckCollisions, or FindCollisions"));
+      " does not support motions; use CheckCollision, BatchCheckCollisions, or FindCollisions"));
 }
 
 absl::Status ValidateMoves(const google::protobuf::RepeatedField<uint32_t>& placements,
                            const google::protobuf::RepeatedField<double>& poses, size_t count) {
   const int moved = placements.size();
   if (poses.size() != kPoseNumbers * moved) {
-    return absl::InvalidArgumentError(absl::StrCat("poses holds ", poses.size(), " numbers for ",
+    return absl::InvalidArgumentError(absl::StrCat("poses has ", poses.size(), " numbers for ",
                                                    moved,
                                                    " placements; each needs seven: w x y z and x "
                                                    "y z"));
@@ -623,11 +622,11 @@ absl::Status ValidatePairs(const google::protobuf::RepeatedField<uint32_t>& pair
                            size_t placements, uint64_t max_pairs, const char* what) {
   if (pairs.size() % 2 != 0) {
     return absl::InvalidArgumentError(
-        absl::StrCat("pairs holds ", pairs.size(), " indices; each pair needs two"));
+        absl::StrCat("pairs has ", pairs.size(), " indices; each pair needs two"));
   }
   const auto count = static_cast<uint64_t>(pairs.size()) / 2;
   if (count > max_pairs) {
-    return LimitExceeded(absl::StrCat(what, " holds ", count, " pairs"), max_pairs,
+    return LimitExceeded(absl::StrCat(what, " has ", count, " pairs"), max_pairs,
                          "max-pairs-per-batch");
   }
   for (int i = 0; i < pairs.size(); ++i) {

@@ -97,8 +97,8 @@ bool IsQuickToRelate(const QueryHull& hull) {
   // **Observed**: exact contact of hulls with 10000 vertices takes 60 us
   // (tests/bench/results/query_relation_*.csv). The first few queries of an unprepared hull scan
   // all of its points.
-  constexpr size_t kMostPoints = 10000;
-  return hull.point_count() <= kMostPoints;
+  constexpr size_t kMaxPoints = 10000;
+  return hull.point_count() <= kMaxPoints;
 }
 
 absl::Status NameLimit(const absl::Status& status, const QueryOptions& options) {

@@ -20,12 +20,12 @@ namespace hulld::server {
 template <typename Scene>
 absl::Status ValidateGroups(const Scene& scene, size_t placements) {
   if (!scene.groups().empty() && static_cast<size_t>(scene.groups_size()) != placements) {
-    return absl::InvalidArgumentError(absl::StrCat("groups holds ", scene.groups_size(),
+    return absl::InvalidArgumentError(absl::StrCat("groups has ", scene.groups_size(),
                                                    " groups for ", placements,
                                                    " placements; set one per placement, or none"));
   }
   if (scene.ignored_group_pairs_size() % 2 != 0) {
-    return absl::InvalidArgumentError(absl::StrCat("ignored_group_pairs holds ",
+    return absl::InvalidArgumentError(absl::StrCat("ignored_group_pairs has ",
                                                    scene.ignored_group_pairs_size(),
                                                    " groups; each pair needs two"));
   }

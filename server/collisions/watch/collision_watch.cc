@@ -24,7 +24,7 @@ constexpr uint64_t kExpectedRounds = 256;
 // Tag and length of an entry within its message.
 constexpr size_t kEntryHeaderBytes = 4;
 // Decoding the poses of an update up to this size takes less than a slice.
-constexpr int kMostShortUpdate = 4096;
+constexpr int kMaxShortUpdate = 4096;
 
 bool IsContact(v1::Relation relation) {
   return relation == v1::RELATION_TOUCHING || relation == v1::RELATION_OVERLAPPING;
@@ -66,7 +66,7 @@ void CollisionWatch::StartWork() {
   if (has_message_) {
     // The first message resolves all hulls.
     if (!is_open_) return work(parts_.long_readers, &CollisionWatch::TakeMessage);
-    const bool is_short = request().update().placements_size() <= kMostShortUpdate;
+    const bool is_short = request().update().placements_size() <= kMaxShortUpdate;
     if (is_short) return work(parts_.pool, &CollisionWatch::TakeMessage);
     return work(lane_, &CollisionWatch::TakeMessage);
   }

@@ -135,7 +135,7 @@ void BodyRegistry::Complete(Locked& locked, const std::string& id,
   state_.catalog.bodies().DropSome(locked);
 }
 
-// Looks up kMostLookupsPerHold bodies per hold and reads the unknown ones together. A reader of
+// Looks up kMaxLookupsPerHold bodies per hold and reads the unknown ones together. A reader of
 // many bodies may evict them again, so bodies already found are not looked up again. Returns
 // nullopt if it would have to wait but may not.
 std::optional<FoundBodies> BodyRegistry::Find(Locked& locked, std::span<const std::string> ids,
@@ -143,9 +143,9 @@ std::optional<FoundBodies> BodyRegistry::Find(Locked& locked, std::span<const st
                                               bool may_wait) {
   FoundBodies found;
   found.bodies.resize(ids.size());
-  for (size_t first = 0; first < ids.size(); first += kMostLookupsPerHold) {
+  for (size_t first = 0; first < ids.size(); first += kMaxLookupsPerHold) {
     if (first > 0) locked.Yield();
-    const size_t end = std::min<size_t>(first + kMostLookupsPerHold, ids.size());
+    const size_t end = std::min<size_t>(first + kMaxLookupsPerHold, ids.size());
     for (size_t i = first; i < end; ++i) {
       while (found.status.ok() && !state_.catalog.IsKnown(ids[i])) {
         if (!may_wait) return std::nullopt;

@@ -57,7 +57,7 @@ class BodyRegistry {
   // Loads unknown records from the store, so it must not run on a gRPC thread. Status: UNAVAILABLE:
   // the store cannot be read; CANCELLED: should_stop returned true; RESOURCE_EXHAUSTED: a read is
   // needed, and readers exceed their share of --memory-limit. Cost: O(log n) each, and one store
-  // query per kMostLookupsPerHold; the mutex is released in between.
+  // query per kMaxLookupsPerHold; the mutex is released in between.
   FoundBodies Find(std::span<const std::string> ids, const std::function<bool()>& should_stop = {});
   // As Find, but returns nullopt without blocking if the store would have to be read.
   std::optional<FoundBodies> TryFind(std::span<const std::string> ids);

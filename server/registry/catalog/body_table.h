@@ -69,7 +69,7 @@ class BodyTable {
   // Evicts down to the limit of a cache. Cost: O(log n) per evicted body.
   void DropSome(Locked& locked);
   // Maximum number of bodies in use that one call skips; takes about 1 us.
-  static constexpr int kMostSkipped = 16;
+  static constexpr int kMaxSkipped = 16;
 
  private:
   static uint64_t BytesOf(const Entry& entry);

@@ -17,7 +17,7 @@ namespace {
 
 // Returns the number of records that fill a sixteenth of the limit, in addition to the memory held
 // for points.
-size_t MostRecords(uint64_t memory_limit) {
+size_t MaxRecords(uint64_t memory_limit) {
   return std::max<uint64_t>(1 << 12, memory_limit / 16 / HullTable::kBytesOfRecord);
 }
 
@@ -32,7 +32,7 @@ Catalog::Catalog(const Store& store, const Limits& limits, MemoryBudget& budget)
       budget_(budget),
       hulls_(store.keeps_hulls(), budget) {
   if (!is_cache_) return;
-  hulls_.KeepAtMost(MostRecords(limits.memory_limit));
+  hulls_.KeepAtMost(MaxRecords(limits.memory_limit));
   bodies_.KeepAtMost(limits.memory_limit / kBodiesShare);
 }
 
@@ -121,7 +121,8 @@ void Catalog::AddBody(Locked& locked, const std::string& id,
 
 void Catalog::LogBodyUnderHull(const std::string& id) {
   spdlog::error(
-      "the store holds a body under the ID of hull \"{}\"; the body is ignored; delete one of the "
+      "the store contains a body under the ID of hull \"{}\"; the body is ignored; delete one of "
+      "the "
       "two",
       id);
 }
@@ -135,7 +136,7 @@ absl::Status Catalog::CheckHullCount() const {
   const uint64_t hulls = HullCount();
   const uint64_t bodies = BodyCount();
   if (hulls + bodies < max_hulls_) return absl::OkStatus();
-  std::string held = absl::StrCat("the store holds ", hulls, " hulls");
+  std::string held = absl::StrCat("the store contains ", hulls, " hulls");
   if (bodies > 0) absl::StrAppend(&held, " and ", bodies, " bodies");
   return LimitExceeded(held, max_hulls_, "max-hulls");
 }

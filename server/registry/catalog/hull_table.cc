@@ -103,9 +103,9 @@ std::unique_ptr<CompactHull> HullTable::ExchangeCompact(Entry& entry,
 
 // Drops the points of some hulls at rest, which the store can read back.
 void HullTable::DropCompact() {
-  constexpr int kMostVisited = 128;
+  constexpr int kMaxVisited = 128;
   auto next = entries_.upper_bound(compact_hand_);
-  for (int i = 0; i < kMostVisited && next != entries_.end(); ++i) {
+  for (int i = 0; i < kMaxVisited && next != entries_.end(); ++i) {
     compact_hand_ = next->first;
     ExchangeCompact(next++->second, nullptr);
   }
@@ -192,7 +192,7 @@ void HullTable::RestSoon(Locked& locked, const RegisteredHull& hull) {
   if (changed == index_.end() || !hull.is_small()) return;
   (*changed)->second.is_idle_ = true;
   just_changed_.push_back(id);
-  for (int i = 0; i < 2 && just_changed_.size() > kMostJustChanged; ++i) {
+  for (int i = 0; i < 2 && just_changed_.size() > kMaxJustChanged; ++i) {
     const auto found = index_.find(just_changed_.front());
     just_changed_.pop_front();
     if (found == index_.end()) continue;
@@ -203,11 +203,11 @@ void HullTable::RestSoon(Locked& locked, const RegisteredHull& hull) {
 
 bool HullTable::RestIdle(Locked& locked, std::string& cursor) {
   // Fewer than lookups, because putting a hull to rest copies its points.
-  constexpr uint64_t kMostRested = kMostLookupsPerHold / 4;
+  constexpr uint64_t kMaxRested = kMaxLookupsPerHold / 4;
   uint64_t rested = 0;
   if (cursor.empty() && passes_since_use_++ >= 2) return false;
   auto next = entries_.upper_bound(cursor);
-  for (uint64_t visited = 0; visited < kMostLookupsPerHold && rested < kMostRested; ++visited) {
+  for (uint64_t visited = 0; visited < kMaxLookupsPerHold && rested < kMaxRested; ++visited) {
     if (next == entries_.end()) return false;
     cursor = next->first;
     Entry& entry = next++->second;

@@ -157,11 +157,11 @@ class HullTable {
   // found no hull in use and none has been looked up since. Cost: about 50 us.
   bool RestIdle(Locked& locked, std::string& cursor);
   // Call after a change of the hull if no session is expected to change it further. Puts a small
-  // hull to rest after kMostJustChanged later calls for small hulls, unless it is looked up before
+  // hull to rest after kMaxJustChanged later calls for small hulls, unless it is looked up before
   // then. A server that is being filled with small hulls therefore keeps few of them in their large
   // form. Cost: about 1 us.
   void RestSoon(Locked& locked, const RegisteredHull& hull);
-  static constexpr size_t kMostJustChanged = 1024;
+  static constexpr size_t kMaxJustChanged = 1024;
   // Bytes of the points and writers of hulls at rest, which count against the budget.
   uint64_t compact_bytes() const { return compact_bytes_; }
 

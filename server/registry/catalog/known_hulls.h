@@ -26,24 +26,24 @@ namespace hulld::server {
 class RecentChanges {
  public:
   // Maximum number of changes: half a megabyte when full.
-  static constexpr uint64_t kMost = 1 << 16;
+  static constexpr uint64_t kCapacity = 1 << 16;
 
   // Differs between processes, so that no client can craft a request of IDs with equal hashes.
   static uint64_t HashOf(std::string_view id) { return absl::HashOf(id); }
 
   void Note(std::string_view id) {
-    if (end_ < kMost) {
+    if (end_ < kCapacity) {
       hashes_.push_back(HashOf(id));
     } else {
-      hashes_[end_ % kMost] = HashOf(id);
+      hashes_[end_ % kCapacity] = HashOf(id);
     }
     ++end_;
   }
   // Position after the last change.
   uint64_t end() const { return end_; }
   // Returns true if all changes from this position on are retained.
-  bool Knows(uint64_t change) const { return end_ - change <= kMost; }
-  uint64_t at(uint64_t change) const { return hashes_[change % kMost]; }
+  bool Knows(uint64_t change) const { return end_ - change <= kCapacity; }
+  uint64_t at(uint64_t change) const { return hashes_[change % kCapacity]; }
 
  private:
   std::vector<uint64_t> hashes_;

@@ -71,7 +71,7 @@ bool RegisteredHull::GrewInto(const StoredHull& stored) const {
          now.revision > before.revision && stored.layout.base_revision == layout.base_revision &&
          stored.layout.delta_count > layout.delta_count &&
          stored.layout.delta_vertices > layout.delta_vertices &&
-         stored.layout.delta_vertices - layout.delta_vertices <= kMostGrowth;
+         stored.layout.delta_vertices - layout.delta_vertices <= kMaxGrowth;
 }
 
 bool RegisteredHull::Supersede(Locked& locked, const StoredHull& stored,
@@ -110,7 +110,7 @@ void RegisteredHull::Grow(Locked& locked, const std::vector<Vector>& points, int
   if (builder() == nullptr) return;
   std::vector<Vector>& backlog = in_flight_.backlog;
   backlog.insert(backlog.end(), points.begin(), points.end());
-  if (backlog.size() > kMostGrowth) DiscardBuilder(locked);
+  if (backlog.size() > kMaxGrowth) DiscardBuilder(locked);
 }
 
 void RegisteredHull::Vanish() {
@@ -333,7 +333,7 @@ std::unique_ptr<CompactHull> RegisteredHull::Compact() const {
     if (!is_small()) return nullptr;
     compact->points = live()->PointsAt(committed_.mark);
     // Preparing drops points that are no longer vertices.
-    if (compact->points.size() > 2 * kMostOfSmall) return nullptr;
+    if (compact->points.size() > 2 * kMaxSmallVertices) return nullptr;
     compact->points.shrink_to_fit();
   }
   if (!readable_from_store_) {

@@ -65,11 +65,11 @@ class RegisteredHull {
  public:
   // Maximum number of a peer server's points that are added to a hull in memory; takes about 100
   // us. With more, the hull is reloaded at its next use, and its builder is rebuilt.
-  static constexpr uint64_t kMostGrowth = 1 << 12;
+  static constexpr uint64_t kMaxGrowth = 1 << 12;
   // Maximum number of vertices of a small hull. Its builder uses more memory than the rest of the
   // hull, and is rebuilt in about 20 us.
-  static constexpr uint64_t kMostOfSmall = 64;
-  bool is_small() const { return committed().record.vertex_count <= kMostOfSmall; }
+  static constexpr uint64_t kMaxSmallVertices = 64;
+  bool is_small() const { return committed().record.vertex_count <= kMaxSmallVertices; }
 
   // readable: true if the store can read the hull back.
   RegisteredHull(const StoredHull& stored, const HullState& initial, bool readable,

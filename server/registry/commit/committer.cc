@@ -208,7 +208,7 @@ void Committer::Settle(Round& round, const absl::Status& status, const absl::Sta
   }
   size_t completed = 0;
   for (Pending& pending : batch) {
-    if (status.ok() && completed > 0 && completed % kMostPerHold == 0) locked.Yield();
+    if (status.ok() && completed > 0 && completed % kMaxPerHold == 0) locked.Yield();
     pending.done(locked, status, pending.change);
     ++completed;
   }

@@ -37,7 +37,7 @@ struct CommitStatistics {
 // queue has the order of their records. The completions of a refused batch run within one hold of
 // it, which makes a refusal safe: between the emptying of the queue and the last completion, no
 // change that builds on a refused one can be submitted. The completions of a committed batch
-// release it after every kMostPerHold completions: each completion leaves a consistent state, and a
+// release it after every kMaxPerHold completions: each completion leaves a consistent state, and a
 // submission in between is equivalent to one during the commit. The queue has its own mutex, so
 // that the committer's thread takes the next batch without waiting for the records. That mutex is
 // acquired after `order`, and no callback runs under it. No lock is held during store calls.
@@ -74,7 +74,7 @@ class Committer {
   };
 
   // Completions of committed changes within one hold of `order`; each takes about a microsecond.
-  static constexpr size_t kMostPerHold = 128;
+  static constexpr size_t kMaxPerHold = 128;
 
   // Both must outlive this.
   Committer(Store& store, FairMutex& order);

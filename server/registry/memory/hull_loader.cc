@@ -28,7 +28,7 @@ bool SpanSpace(std::span<const Vector> points) {
 constexpr uint64_t kPointsAtOnce = 1024;
 constexpr size_t kHullsAtOnce = 16;
 // Minimum number of parts of a large job: small parts let all threads finish together.
-constexpr size_t kLeastParts = 8;
+constexpr size_t kMinParts = 8;
 
 uint64_t PointCount(const StoredHull& stored) {
   return stored.layout.base_vertices + stored.layout.delta_vertices;
@@ -70,7 +70,7 @@ LoadJob::LoadJob(Store& store, std::vector<StoredHull> hulls, WorkerPool& helper
   std::iota(order_.begin(), order_.end(), 0);
   // Hulls created one after the other are adjacent in the store.
   std::ranges::sort(order_, {}, [&](uint32_t i) { return hulls_[i].record.create_revision; });
-  const size_t most = std::clamp<size_t>(order_.size() / kLeastParts, 1, kHullsAtOnce);
+  const size_t most = std::clamp<size_t>(order_.size() / kMinParts, 1, kHullsAtOnce);
   uint64_t points = 0;
   size_t begin = 0;
   for (uint32_t n = 0; n < order_.size(); ++n) {

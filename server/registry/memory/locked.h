@@ -18,14 +18,14 @@ namespace hulld::server {
 
 // Maximum number of hulls and bodies looked up within one hold of the registry's mutex; takes about
 // 50 us.
-inline constexpr uint64_t kMostLookupsPerHold = 128;
+inline constexpr uint64_t kMaxLookupsPerHold = 128;
 
 // Longest hold of a mutex, and the maximum work within one hold.
 struct HoldStatistics {
   // Longest hold within this minute and the one before. Waiting on a condition is not a hold.
   std::chrono::nanoseconds longest{0};
   // Maximum number of hulls looked up within one hold.
-  uint64_t most_lookups = 0;
+  uint64_t max_lookups = 0;
 };
 
 // A mutex without barging: a waiting thread gets it before the releasing thread can acquire it
@@ -61,7 +61,7 @@ class FairMutex {
     const auto longest = age == 0   ? std::max(longest_, longest_before_)
                          : age == 1 ? longest_
                                     : std::chrono::nanoseconds(0);
-    return {longest, std::max(most_lookups_, lookups_)};
+    return {longest, std::max(max_lookups_, lookups_)};
   }
 
  private:
@@ -83,7 +83,7 @@ class FairMutex {
       minute_ = minute;
     }
     longest_ = std::max<std::chrono::nanoseconds>(longest_, now - since_);
-    most_lookups_ = std::max(most_lookups_, lookups_);
+    max_lookups_ = std::max(max_lookups_, lookups_);
   }
 
   Mutex entry_;
@@ -93,7 +93,7 @@ class FairMutex {
   // mutex_ guards the members below.
   Clock::time_point since_;
   uint64_t lookups_ = 0;
-  uint64_t most_lookups_ = 0;
+  uint64_t max_lookups_ = 0;
   int64_t minute_ = 0;
   std::chrono::nanoseconds longest_{0};
   std::chrono::nanoseconds longest_before_{0};
@@ -147,9 +147,9 @@ class Locked {
   void NoteLookup() { ++mutex_.lookups_; }
   uint64_t lookups() const { return mutex_.lookups_; }
 
-  // Counts one of many lookups; first yields the mutex after kMostLookupsPerHold of them.
+  // Counts one of many lookups; first yields the mutex after kMaxLookupsPerHold of them.
   void NoteLookupMaybeYield() {
-    if (lookups() == kMostLookupsPerHold) Yield();
+    if (lookups() == kMaxLookupsPerHold) Yield();
     NoteLookup();
   }
 

@@ -121,7 +121,7 @@ void MemoryCharge::Set(uint64_t bytes) {
 
 void MemoryBudget::Evict(Locked& owners) {
   HULLD_CHECK(owners.Holds(owners_));
-  const size_t most = std::min(kMostVisited, used_.size());
+  const size_t most = std::min(kMaxVisited, used_.size());
   for (size_t visited = 0; visited < most && !used_.empty() && Statistics().bytes > limit_bytes_;
        ++visited) {
     Account& account = *used_.back();

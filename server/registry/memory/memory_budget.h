@@ -120,7 +120,7 @@ class MemoryBudget {
   };
 
   // Maximum number of accounts that one eviction visits; takes about 10 us.
-  static constexpr size_t kMostVisited = 64;
+  static constexpr size_t kMaxVisited = 64;
 
   // limit_bytes: --memory-limit. reading_bytes: the readers' share; writers get the rest. owners:
   // the mutex that guards the accounts; it may not be constructed yet.
@@ -132,7 +132,7 @@ class MemoryBudget {
   MemoryBudget& operator=(const MemoryBudget&) = delete;
 
   // Evicts from accounts, least recently used first, until the memory is within the limit or
-  // kMostVisited accounts were visited. An account that cannot evict is visited again after all
+  // kMaxVisited accounts were visited. An account that cannot evict is visited again after all
   // other accounts.
   void Evict(Locked& owners);
   // As Evict. RESOURCE_EXHAUSTED, with a retry delay: this use exceeds its share.

@@ -75,7 +75,7 @@ std::vector<HullGrowth> PeerSync::GrownHulls(const PeerChanges& changes) const {
     const StoredHull& stored = **change.hull;
     if (!hull.GrewInto(stored)) continue;
     points += stored.layout.delta_vertices - hull.committed().layout.delta_vertices;
-    if (grown.size() == kMostGrownHulls || points > kMostGrowth) break;
+    if (grown.size() == kMaxGrownHulls || points > kMaxGrowth) break;
     grown.push_back({hull.committed(), stored});
   }
   return grown;

@@ -26,8 +26,8 @@ class PeerSync : public ReadBarrier, public Committer::Peers {
  public:
   // Maximum number of hulls that grow by peer servers' points within one hold of the mutex, and of
   // their points in total; takes a few milliseconds.
-  static constexpr size_t kMostGrownHulls = 1 << 10;
-  static constexpr uint64_t kMostGrowth = 1 << 16;
+  static constexpr size_t kMaxGrownHulls = 1 << 10;
+  static constexpr uint64_t kMaxGrowth = 1 << 16;
 
   // All must outlive this. Registers with the committer.
   PeerSync(RegistryState& state, Committer& committer, PeerFeed& feed);

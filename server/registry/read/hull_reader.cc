@@ -96,7 +96,7 @@ absl::Status HullReader::LookUpAll(Locked& locked, const HullsRead& read) {
       return absl::OkStatus();
     }
     locked.NoteLookup();
-    if (locked.lookups() < kMostLookupsPerHold) continue;
+    if (locked.lookups() < kMaxLookupsPerHold) continue;
     locked.Unlock();
     const bool stopped = Stopped(read.should_stop);
     locked.Lock();
@@ -180,7 +180,7 @@ absl::StatusOr<bool> HullReader::AwaitRecord(Locked& locked, const HullsRead& re
     return false;
   }
   std::vector<const std::string*> wanted = {&read.ids[hulls.hulls_[k].first]};
-  const size_t count = std::min<size_t>(hulls.due_.size(), kMostLookupsPerHold - 1);
+  const size_t count = std::min<size_t>(hulls.due_.size(), kMaxLookupsPerHold - 1);
   for (const uint32_t due : std::span(hulls.due_).last(count)) {
     if (due != k) wanted.push_back(&read.ids[hulls.hulls_[due].first]);
   }
@@ -263,11 +263,11 @@ bool HullReader::BeginLoading(Locked& locked, const HullsRead& read) {
   KnownHulls& hulls = read.known;
   // At about 200 bytes per point, a twentieth of the memory limit: the readers' share is not
   // checked until each hull is looked up.
-  uint64_t most_points = std::min<uint64_t>(1 << 17, state_.limits.memory_limit / 4096);
+  uint64_t max_points = std::min<uint64_t>(1 << 17, state_.limits.memory_limit / 4096);
   // Two jobs, so that the second loads while the hulls of the first are looked up.
-  const uint64_t enough_points = most_points / 2;
+  const uint64_t enough_points = max_points / 2;
   for (const KnownHulls::Loading& loading : hulls.ahead_) {
-    most_points -= std::min(most_points, loading.points);
+    max_points -= std::min(max_points, loading.points);
   }
   if (locked.lookups() > 0) locked.Yield();
   KnownHulls::Loading next;
@@ -275,7 +275,7 @@ bool HullReader::BeginLoading(Locked& locked, const HullsRead& read) {
   // due_ is processed from the back.
   size_t& end = hulls.ahead_end_;
   end = std::min(end, hulls.due_.size());
-  for (uint64_t looked_at = 1; end > 0 && looked_at < kMostLookupsPerHold; ++looked_at) {
+  for (uint64_t looked_at = 1; end > 0 && looked_at < kMaxLookupsPerHold; ++looked_at) {
     const uint32_t k = hulls.due_[end - 1];
     locked.NoteLookup();
     const KnownHulls::Known& known = hulls.hulls_[k];
@@ -288,7 +288,7 @@ bool HullReader::BeginLoading(Locked& locked, const HullsRead& read) {
     }
     const VertexLayout& layout = hull->committed().layout;
     const uint64_t points = next.points + layout.base_vertices + layout.delta_vertices;
-    if (points > most_points || (points > enough_points && next.hulls.size() > 1)) break;
+    if (points > max_points || (points > enough_points && next.hulls.size() > 1)) break;
     --end;
     next.points = points;
     next.found.push_back(hull);

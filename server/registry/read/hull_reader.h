@@ -24,7 +24,7 @@ namespace hulld::server {
 
 // Returns hulls ready to be served, all at one revision.
 //
-// A read looks up kMostLookupsPerHold hulls per hold of the mutex and releases it in between. At
+// A read looks up kMaxLookupsPerHold hulls per hold of the mutex and releases it in between. At
 // the end it looks up the hulls that changed since, until one hold covers all remaining ones: then
 // all are at one revision. This terminates, because a commit takes longer than a lookup. Readers
 // and writers never wait for each other: a reader gets the version of the committed state, created

@@ -18,8 +18,8 @@ namespace hulld::server {
 namespace {
 
 // IDs per store query, and threads that query.
-constexpr size_t kMostAtOnce = kMostLookupsPerHold;
-constexpr size_t kMostThreads = 2;
+constexpr size_t kMaxAtOnce = kMaxLookupsPerHold;
+constexpr size_t kMaxThreads = 2;
 
 // The store reported an older revision than `asked_at`, its revision before the query.
 absl::Status WentBack(uint64_t found, uint64_t asked_at) {
@@ -29,7 +29,7 @@ absl::Status WentBack(uint64_t found, uint64_t asked_at) {
 }
 
 absl::Status IsAhead(uint64_t found, uint64_t known) {
-  return absl::UnavailableError(absl::StrCat("the store holds changes up to revision ", found,
+  return absl::UnavailableError(absl::StrCat("the store contains changes up to revision ", found,
                                              ", but only changes up to ", known,
                                              " are known to be committed; retry"));
 }
@@ -48,7 +48,7 @@ void RecordReader::WhenKnown(Locked& locked, const std::string& id, Refusal refu
   reading->waiting.emplace_back(std::move(refuse), std::move(next));
   if (!is_new) return;
   due_.push_back(reading);
-  if (threads_ == kMostThreads) return;
+  if (threads_ == kMaxThreads) return;
   ++threads_;
   loaders_.Submit([this] { ReadDue(); }, kRecordReader);
 }
@@ -78,7 +78,7 @@ void RecordReader::ReadDue() {
   Locked locked(state_.mutex);
   if (!due_.empty()) {
     const auto first = due_.begin();
-    const auto last = first + std::min<ptrdiff_t>(due_.size(), kMostAtOnce);
+    const auto last = first + std::min<ptrdiff_t>(due_.size(), kMaxAtOnce);
     const Readings taken(first, last);
     due_.erase(first, last);
     ReadRecords(locked, taken);
@@ -92,7 +92,7 @@ void RecordReader::ReadDue() {
 
 absl::Status RecordReader::AwaitKnown(Locked& locked, std::span<const std::string* const> ids,
                                       const std::function<bool()>& should_stop) {
-  HULLD_CHECK(!ids.empty() && ids.size() <= kMostAtOnce);
+  HULLD_CHECK(!ids.empty() && ids.size() <= kMaxAtOnce);
   // Runs the deferred tasks before waiting.
   locked.Yield();
   Readings own;

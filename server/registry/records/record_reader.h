@@ -68,7 +68,7 @@ class RecordReader : public PeerChangeListener, public PageSource {
   bool MustWait(Locked& locked, const std::string& id, For need, const Refusal& refuse,
                 LockedTask next);
 
-  // Blocks until the first ID is known; also reads up to kMostLookupsPerHold pending IDs. Releases
+  // Blocks until the first ID is known; also reads up to kMaxLookupsPerHold pending IDs. Releases
   // the mutex. Returns the error of the read, or CANCELLED if should_stop, which may be empty,
   // returned true. OK: the ID was known at some time since. Requires at least one ID.
   absl::Status AwaitKnown(Locked& locked, std::span<const std::string* const> ids,

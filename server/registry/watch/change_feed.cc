@@ -292,7 +292,7 @@ void ChangeFeed::ChangeIds(Watch& watch, std::span<const std::string> added,
   HULLD_CHECK(!group->target.lists_existing);
   const auto in_slices = [this](std::span<const std::string> ids, const auto& change) {
     while (!ids.empty()) {
-      const size_t count = std::min<size_t>(ids.size(), kMostLookupsPerHold);
+      const size_t count = std::min<size_t>(ids.size(), kMaxLookupsPerHold);
       const std::lock_guard lock(mutex_);
       for (const std::string& id : ids.first(count)) change(id);
       ids = ids.subspan(count);

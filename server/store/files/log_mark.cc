@@ -28,7 +28,7 @@ static_assert(sizeof(Slot) == 512);
 constexpr uint64_t kSlotDistance = 4096;
 constexpr size_t kHeadWords = 3;
 constexpr size_t kLogWords = 3;
-constexpr size_t kMostLogs = (kSlotWords - kHeadWords - 1) / kLogWords;
+constexpr size_t kMaxLogs = (kSlotWords - kHeadWords - 1) / kLogWords;
 
 uint32_t Crc32(uint32_t crc, std::string_view bytes) {
   return static_cast<uint32_t>(
@@ -45,7 +45,7 @@ uint64_t ChecksumOf(const Slot& slot) {
 
 // Encodes only the newest logs if the slot cannot hold all of them. RocksDB keeps one to three.
 Slot Encode(const LogMark& mark, uint64_t generation) {
-  const size_t count = std::min(mark.logs.size(), kMostLogs);
+  const size_t count = std::min(mark.logs.size(), kMaxLogs);
   Slot slot = {generation, mark.revision, count};
   auto log = std::prev(mark.logs.end(), static_cast<std::ptrdiff_t>(count));
   for (size_t word = kHeadWords; log != mark.logs.end(); ++log, word += kLogWords) {
@@ -64,7 +64,7 @@ struct Decoded {
 
 // None if the slot was never written, or is damaged.
 std::optional<Decoded> Decode(const Slot& slot) {
-  if (slot.back() != ChecksumOf(slot) || slot[2] > kMostLogs) return std::nullopt;
+  if (slot.back() != ChecksumOf(slot) || slot[2] > kMaxLogs) return std::nullopt;
   Decoded decoded = {slot[0], {slot[1], {}}};
   for (size_t i = 0; i < slot[2]; ++i) {
     const uint64_t* const log = &slot[kHeadWords + i * kLogWords];
@@ -120,7 +120,7 @@ absl::StatusOr<std::string> Compare(rocksdb::FileSystem& files, const std::strin
     status = file->Read(wanted, IOOptions(), &read, scratch.data(), nullptr);
     if (!status.ok()) return failure(status);
     if (read.empty()) {
-      return absl::StrCat("the log ", name, " holds ", size, " bytes of ", synced.size);
+      return absl::StrCat("the log ", name, " has ", size, " bytes of ", synced.size);
     }
     size += read.size();
     crc32 = Crc32(crc32, {read.data(), read.size()});

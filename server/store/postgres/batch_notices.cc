@@ -99,7 +99,7 @@ absl::Status BatchNotices::Serve() {
       const absl::Status sent = session.Run(absl::StrCat(kNotify, ", '", batch, "'")).status();
       if (!sent.ok()) return sent;
       sent_ = batch;
-      next = Clock::now() + kLeastPause;
+      next = Clock::now() + kMinPause;
     }
     // Notices also arrive with the answers to queries.
     for (const std::string& payload : session.TakeNotices()) {

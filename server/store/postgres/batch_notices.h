@@ -24,7 +24,7 @@ absl::StatusOr<uint64_t> LastBatch(Session& session);
 // that does not receive it polls the store, and correctness does not depend on its arrival.
 //
 // A notice is sent after the commit, in a separate transaction that does not wait for the disk, and
-// notices within kLeastPause are merged. NOTIFY within the transaction of the batch would save the
+// notices within kMinPause are merged. NOTIFY within the transaction of the batch would save the
 // extra send, but PostgreSQL then holds a cluster-wide lock from before the commit until its log is
 // on disk, here and on synchronous standbys. The batches of a store are serialized anyway. But 8
 // writers that share only the cluster, such as 8 stores, dropped from 1460 commits a second to 430,
@@ -38,7 +38,7 @@ class BatchNotices {
  public:
   using Opener = std::function<absl::StatusOr<std::unique_ptr<Session>>()>;
 
-  static constexpr std::chrono::milliseconds kLeastPause{2};
+  static constexpr std::chrono::milliseconds kMinPause{2};
 
   // open: creates the session. on_batch: receives, on the thread, the number of each committed
   // batch, including this server's, and the last one whenever listening begins. fallback: log text

@@ -15,7 +15,7 @@ namespace {
 using Element = ArrayParameter::Element;
 
 // A message of PostgreSQL's protocol is limited to 1 GB; statements stay far below.
-constexpr size_t kMostStatementBytes = 16 << 20;
+constexpr size_t kMaxStatementBytes = 16 << 20;
 
 // Rows of a hull after a batch.
 struct HullRows {
@@ -64,7 +64,7 @@ class RowsOfTable {
       column->Add(value);
       bytes += (column++)->bytes();
     }
-    if (bytes >= kMostStatementBytes) Flush(statements);
+    if (bytes >= kMaxStatementBytes) Flush(statements);
   }
 
   void Flush(std::vector<Statement>* statements) {

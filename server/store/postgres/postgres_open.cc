@@ -17,8 +17,8 @@
 namespace hulld::server {
 namespace {
 
-constexpr int kMostReaders = 8;
-constexpr int kLeastServerVersion = 140'000;
+constexpr int kMaxReaders = 8;
+constexpr int kMinServerVersion = 140'000;
 constexpr char kLockNotAvailable[] = "55P03";
 // Pauses between attempts to become the active server.
 constexpr std::chrono::milliseconds kFirstTurnPause{10};
@@ -255,7 +255,7 @@ PostgresStore::PostgresStore(PostgresOptions options, Conninfo conninfo)
     : options_(std::move(options)),
       conninfo_(std::move(conninfo)),
       owner_(OwnerName()),
-      readers_([this] { return OpenReader(); }, kMostReaders),
+      readers_([this] { return OpenReader(); }, kMaxReaders),
       follower_([this] { return OpenReader(); }, 1) {}
 
 absl::StatusOr<std::unique_ptr<PostgresStore>> PostgresStore::Open(PostgresOptions options) {
@@ -365,7 +365,7 @@ absl::StatusOr<Rows> PostgresStore::RunPatiently(Session& session, const std::st
 
 // Checks the server's version and determines its durability.
 absl::Status PostgresStore::CheckServer(Session& session) {
-  if (session.server_version() < kLeastServerVersion) {
+  if (session.server_version() < kMinServerVersion) {
     return absl::FailedPreconditionError(absl::StrCat("the database is PostgreSQL ",
                                                       session.server_version() / 10'000,
                                                       "; hulld requires 14 or later"));

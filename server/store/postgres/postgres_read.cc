@@ -138,7 +138,7 @@ absl::StatusOr<FoundRecords> PostgresStore::ListRecords(const std::string& prefi
       ReadOne({.name = "hulld_list",
                .parameters = {may_be ? prefix : "\x7f", after, EncodeBigint(most + 1),
                               EncodeBoolean(kinds.hulls), EncodeBoolean(kinds.bodies),
-                              EncodeBigint(kMostListedBytes)}});
+                              EncodeBigint(kMaxListedBytes)}});
   if (!rows.ok()) return rows.status();
   return FoundIn(*rows, prefix, most);
 }

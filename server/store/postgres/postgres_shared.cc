@@ -24,7 +24,7 @@ constexpr uint64_t kBatchesPerPruning = 1 << 10;
 // Maximum number of changed IDs that a server applies as one. Applying this many took 0.2 s under
 // the registry's mutex (**observed**, with hulls created and deleted in between, at load 6). They
 // form one version for readers, so they cannot be applied in parts.
-constexpr int kMostFollowed = 1 << 17;
+constexpr int kMaxFollowed = 1 << 17;
 
 // hulld.changes lists the IDs changed by each batch, for peer servers: `revision` is the store's
 // after the last change of the ID in the batch; `ended_at` is the revision at which an incarnation
@@ -97,7 +97,7 @@ constexpr char kPrepareShared[] = R"(
 // Selects the changes of peer servers after this batch.
 Statement FetchStatement(uint64_t batch) {
   return {.name = "hulld_follow",
-          .parameters = {EncodeBigint(batch), EncodeBigint(kMostFollowed + 1)}};
+          .parameters = {EncodeBigint(batch), EncodeBigint(kMaxFollowed + 1)}};
 }
 
 // Returns the create_revision of the incarnation that a change ends; 0: none. It is unknown for a
@@ -223,9 +223,9 @@ absl::Status PostgresStore::CheckStore(const Rows& rows) {
     End(absl::UnavailableError(
         absl::StrCat("this server is more than ", kKeptBatches,
                      " batches behind its peers and exits; restart it to catch up")));
-  } else if (rows.count() > kMostFollowed) {
+  } else if (rows.count() > kMaxFollowed) {
     End(absl::UnavailableError(absl::StrCat(
-        "peer servers changed more than ", kMostFollowed,
+        "peer servers changed more than ", kMaxFollowed,
         " hulls and bodies since this server's last sync; it exits; restart it to catch up")));
   }
   return ended();

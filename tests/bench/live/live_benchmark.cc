@@ -1,7 +1,7 @@
 // Cost of a step of a growing hull, of hulld and of Bullet: some points are added, then some
 // queries run.
 //
-//   live_benchmark [MOST_VERTICES [SECONDS]]
+//   live_benchmark [MAX_VERTICES [SECONDS]]
 //
 // with_box_us: the median of a step that also updates the bounding box; hulld always does, Bullet
 // by addPoint's default. One row of CSV per workload, number of vertices, and library. Both process
@@ -144,12 +144,12 @@ class Run {
     HULLD_CHECK(start.Add(points).ok());
     const auto begin = Clock::now();
     // The hull keeps its approximate size: it restarts after it has grown by a half.
-    const int most_steps = std::max(1, vertices_ / 2 / std::max(1, workload_.points));
+    const int max_steps = std::max(1, vertices_ / 2 / std::max(1, workload_.points));
     do {
       if (workload_.cold) {
         AskCold(start.Vertices());
       } else {
-        Grow(start, points, std::min(most_steps, 20000));
+        Grow(start, points, std::min(max_steps, 20000));
       }
     } while (Microseconds(Clock::now() - begin) < seconds_ * 1e6);
     Row("hulld", hulld_, moved_ / static_cast<double>(hulld_.step.size()));

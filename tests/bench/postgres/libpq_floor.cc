@@ -10,7 +10,7 @@ namespace {
 constexpr uint32_t kBytea = 17;
 constexpr uint32_t kBigint = 20;
 constexpr uint32_t kText = 25;
-constexpr uint64_t kMostFollowed = 1 << 17;
+constexpr uint64_t kMaxFollowed = 1 << 17;
 constexpr uint64_t kBatchesPerPruning = 1 << 10;
 
 // Same as in hulld's sessions (server/store/postgres).
@@ -179,7 +179,7 @@ LibpqFloor::Statement LibpqFloor::Fence() const {
 }
 
 LibpqFloor::Statement LibpqFloor::FetchPeerChanges() const {
-  return {"follow", {Bigint(batch_), Bigint(kMostFollowed + 1)}};
+  return {"follow", {Bigint(batch_), Bigint(kMaxFollowed + 1)}};
 }
 
 void LibpqFloor::Commit() {

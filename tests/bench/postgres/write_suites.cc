@@ -130,8 +130,7 @@ void MeasureIngest(const Arguments& arguments) {
       for (double& value : *each) value /= kPoints;
     }
   }
-  Rows rows(arguments.out,
-            "server,points,per_second,least_per_second,cpu_us,database_cpu_us,rounds");
+  Rows rows(arguments.out, "server,points,per_second,min_per_second,cpu_us,database_cpu_us,rounds");
   for (const Subject& subject : subjects) {
     rows.Add(absl::StrFormat("%s,%d,%.0f,%.0f,%.4f,%.4f,%d", subject.name, kPoints,
                              Median(subject.rate), std::ranges::min(subject.rate),

@@ -40,9 +40,9 @@ using Clock = std::chrono::steady_clock;
 
 constexpr char kBall[] = "busy/ball";
 constexpr int kVertices = 64;
-constexpr std::chrono::seconds kMostPerCall(20);
+constexpr std::chrono::seconds kMaxPerCall(20);
 // For one kind of work in one round.
-constexpr std::chrono::seconds kMostPerTurn(2);
+constexpr std::chrono::seconds kMaxPerTurn(2);
 
 // A process that computes until this is destroyed.
 class BusyProgram {
@@ -111,7 +111,7 @@ void RequireOrGivenUp(const grpc::Status& status, const char* what) {
 
 void RunBatch(v1::CollisionService::Stub& stub, const v1::BatchCheckCollisionsRequest& request) {
   grpc::ClientContext context;
-  context.set_deadline(std::chrono::system_clock::now() + kMostPerCall);
+  context.set_deadline(std::chrono::system_clock::now() + kMaxPerCall);
   const auto reader = stub.BatchCheckCollisions(&context, request);
   v1::BatchCheckCollisionsResponse part;
   while (reader->Read(&part)) {
@@ -121,7 +121,7 @@ void RunBatch(v1::CollisionService::Stub& stub, const v1::BatchCheckCollisionsRe
 
 void RunScene(v1::CollisionService::Stub& stub, const v1::FindCollisionsRequest& request) {
   grpc::ClientContext context;
-  context.set_deadline(std::chrono::system_clock::now() + kMostPerCall);
+  context.set_deadline(std::chrono::system_clock::now() + kMaxPerCall);
   const auto reader = stub.FindCollisions(&context, request);
   v1::FindCollisionsResponse part;
   while (reader->Read(&part)) {
@@ -234,7 +234,7 @@ void Measure(const std::string& address, const v1::BatchCheckCollisionsRequest& 
   if (row->load.batches) batches = std::make_unique<BatchClient>(address, batch);
   row->call(0);  // the effects of the load change have settled
   const auto start = Clock::now();
-  for (int i = 1; i <= row->calls_per_turn && Clock::now() - start < kMostPerTurn; ++i) {
+  for (int i = 1; i <= row->calls_per_turn && Clock::now() - start < kMaxPerTurn; ++i) {
     const auto sent = Clock::now();
     row->call(i);
     const std::chrono::duration<double, std::milli> taken = Clock::now() - sent;

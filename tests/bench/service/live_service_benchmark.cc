@@ -51,7 +51,7 @@ constexpr char kProbe[] = "live/probe";
 constexpr int kRounds = 5;
 constexpr int kRestarts = 5;
 constexpr int kCallsPerTurn = 400;
-constexpr std::chrono::seconds kMostPerTurn(2);
+constexpr std::chrono::seconds kMaxPerTurn(2);
 // Chunks in flight, as of a client that does not wait for each.
 constexpr uint64_t kWindow = 32;
 
@@ -111,7 +111,7 @@ struct Row {
 void MeasureTurn(v1::CollisionService::Stub& stub, const char* hull_id,
                  const std::function<void()>& before, Row* row) {
   const auto start = Clock::now();
-  for (int i = 0; i < kCallsPerTurn && Clock::now() - start < kMostPerTurn; ++i) {
+  for (int i = 0; i < kCallsPerTurn && Clock::now() - start < kMaxPerTurn; ++i) {
     before();
     row->times.push_back(Ask(stub, hull_id, i));
   }

@@ -62,7 +62,7 @@ def main():
     hulld = viewing.Hulld(viewing.bin_directory())
     folder = pathlib.Path(hulld.directory)
     try:
-        print("case,frames,triangles,load_s,median_ms,most_ms,heap_mib")
+        print("case,frames,triangles,load_s,median_ms,max_ms,heap_mib")
         for i in range(100):
             hulld.hullctl("generate", "sphere", "64", "--seed", str(i), "-o", "points.xyz")
             hulld.hullctl("append", f"crowd/{i}", "points.xyz", "--create")

@@ -137,7 +137,7 @@ TEST_F(GuardedServer, TheTokenMayComeFromTheEnvironment) {
                                          authorities_};
   const Ran none = RunTool(list);
   EXPECT_EQ(none.code, 1);
-  EXPECT_THAT(none.err, AllOf(HasSubstr("carries no token"), HasSubstr("--token-file")));
+  EXPECT_THAT(none.err, AllOf(HasSubstr("has no token"), HasSubstr("--token-file")));
   setenv("HULLD_TOKEN", TokenOf("view").c_str(), 1);
   EXPECT_EQ(RunTool(list).code, 0);
   setenv("HULLD_TOKEN", "hunter2", 1);

@@ -363,7 +363,7 @@ TEST_F(HullctlQuestions, SceneFindsCollisions) {
   const TempFile groups("groups.json", placements + R"(,"groups":[1]})");
   ran = Ask({"scene", groups.path()});
   EXPECT_EQ(ran.code, 1);
-  EXPECT_THAT(ran.err, HasSubstr("groups holds 1 groups for 3 placements"));
+  EXPECT_THAT(ran.err, HasSubstr("groups has 1 groups for 3 placements"));
   const TempFile lost("lost.json", R"({"placements":[{"hullId":"nope"}]})");
   ran = Ask({"scene", lost.path()});
   EXPECT_EQ(ran.code, 4);

@@ -75,7 +75,7 @@ def test_malformed_points_are_refused(client: hulld.Client, cube: str) -> None:
     with pytest.raises(ValueError, match=r"points\[0\].y is nan"):
         client.check_collision(np.array([[0, np.nan, 0]]), cube)
     for count in (0, 4097):
-        with pytest.raises(ValueError, match=f"points holds {count} points"):
+        with pytest.raises(ValueError, match=f"points has {count} points"):
             client.check_collision(np.zeros((count, 3)), cube)
     with pytest.raises(ValueError, match="not both"):
         hulld.Placement(cube, points=CUBE)

@@ -50,12 +50,12 @@ def test_integers_pass_where_a_double_holds_them() -> None:
     for bad in (2**53 + 1, 2**63 - 1, -(2**53) - 1):
         with pytest.raises(ValueError, match=rf"points\[0\]\[2\] is {bad}"):
             hulld.as_points(np.array([[0, 0, bad]]))
-    with pytest.raises(ValueError, match="no double holds exactly"):
+    with pytest.raises(ValueError, match="no double represents exactly"):
         hulld.as_points(np.array([[0, 0, 2**64 - 1]], np.uint64))
 
 
 def test_long_doubles_are_not_rounded_silently() -> None:
-    with pytest.raises(ValueError, match="no double holds exactly"):
+    with pytest.raises(ValueError, match="no double represents exactly"):
         hulld.as_points(np.array([[0, 0, 1]], np.longdouble) / 3)
     assert hulld.as_points(np.array([[0, 0, 0.5]], np.longdouble)).tolist() == [[0, 0, 0.5]]
 

@@ -117,9 +117,9 @@ def test_what_is_no_motion_is_refused(bad: np.ndarray, message: str) -> None:
 
 
 def test_numbers_that_no_double_holds_are_refused() -> None:
-    with pytest.raises(ValueError, match=rf"pose\[0\] is {2**53 + 1}, which no double holds"):
+    with pytest.raises(ValueError, match=rf"pose\[0\] is {2**53 + 1}, which no double represents"):
         hulld.pack_poses([np.array([2**53 + 1, 0, 0])])
-    with pytest.raises(ValueError, match="no double holds"):
+    with pytest.raises(ValueError, match="no double represents"):
         hulld.pack_poses(np.ones((1, 7), np.longdouble) / 3)
     with pytest.raises(TypeError, match="not numbers"):
         hulld.pack_poses([("a", "b", "c")])

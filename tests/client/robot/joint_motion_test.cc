@@ -162,7 +162,7 @@ TEST_P(JointMotion, PointsStayWithinTheirDeviationAndTravel) {
       for (const double t : {0.0, 0.25, 0.5, 1.0}) {
         const auto exact = ExactMotions(robot_, X_WB, from, to, begin + Real{t} * duration);
         for (size_t i = 0; i < exact.size(); ++i) {
-          if (duration * bounds[i].turn > MotionBound::kMostTurn) continue;
+          if (duration * bounds[i].turn > MotionBound::kMaxTurn) continue;
           const Vector q = exact[i].Apply(p);
           const Real deviation = Distance(q, Between(X[i], Y[i], t).Apply(p));
           const double bound = bounds[i].Deviation(duration, kReach);

@@ -84,7 +84,7 @@ TEST_F(PackagePath, UrisMayContainEscapes) {
 
 TEST_F(PackagePath, ErrorsListTheSearchedFolders) {
   EXPECT_THAT(Resolve("package://tool/a.stl"),
-              testing::AllOf(HasSubstr("no folder of the package \"tool\" holds a.stl"),
+              testing::AllOf(HasSubstr("no folder of the package \"tool\" contains a.stl"),
                              HasSubstr("--package tool=DIR"), HasSubstr(At("ws/src/tool"))));
   EXPECT_THAT(Resolve("package://tool"), HasSubstr("is not a package file"));
 }

@@ -19,7 +19,7 @@ using ::testing::HasSubstr;
 constexpr v1::Relation kSeparated = v1::RELATION_SEPARATED;
 constexpr v1::Relation kTouching = v1::RELATION_TOUCHING;
 constexpr v1::Relation kOverlapping = v1::RELATION_OVERLAPPING;
-constexpr double kLeast = std::numeric_limits<double>::denorm_min();
+constexpr double kMin = std::numeric_limits<double>::denorm_min();
 
 struct Hull {
   std::vector<double> xyz;
@@ -108,7 +108,7 @@ TEST(CertificateCheck, ADirectionSeparatesOrNotByOneUlp) {
   const Hull touching = At(Cube(), 1);
   ExpectValid(kSeparated, Direction(1, 0, 0), a, apart);
   ExpectValid(kSeparated, Direction(1e-300, 0, 0), a, apart);
-  ExpectValid(kSeparated, Direction(kLeast, 0, 0), a, apart);
+  ExpectValid(kSeparated, Direction(kMin, 0, 0), a, apart);
   ExpectInvalid(kSeparated, Direction(1, 0, 0), a, touching, "does not separate");
   ExpectInvalid(kSeparated, Direction(-1, 0, 0), a, apart, "does not separate");
   ExpectInvalid(kSeparated, Direction(1, 1e-15, 0), a, apart, "does not separate");
@@ -187,8 +187,8 @@ TEST(CertificateCheck, TouchingInEveryDimension) {
   ExpectValid(kTouching, corners, triangle, At({0, 0, 0}));
   ExpectValid(kTouching, corners, triangle, At({1, 1, 0}));
   ExpectInvalid(kTouching, corners, triangle, At({1, std::nextafter(1.0, 2.0), 0}), "0 is not");
-  ExpectInvalid(kTouching, corners, triangle, At({0, 0, kLeast}), "0 is not");
-  ExpectInvalid(kTouching, corners, triangle, At({0, 0, -kLeast}), "max n.A > min n.B");
+  ExpectInvalid(kTouching, corners, triangle, At({0, 0, kMin}), "0 is not");
+  ExpectInvalid(kTouching, corners, triangle, At({0, 0, -kMin}), "max n.A > min n.B");
   // Collinear segments that overlap or share an end.
   ExpectValid(kTouching, Direction(0, 1, 0, {{0, 1}, {1, 0}}), along_x, At(along_x.xyz, 1));
   ExpectValid(kTouching, Direction(1, 0, 0, {{1, 0}}), along_x, At(along_x.xyz, 2));
@@ -199,9 +199,9 @@ TEST(CertificateCheck, OverlappingNeedsTheOriginInside) {
   const Hull a = At(Tetrahedron());
   const Pairs corners = {{0, 0}, {1, 0}, {2, 0}, {3, 0}};
   ExpectValid(kOverlapping, PairsOnly(corners), a, At({1, 1, 1}));
-  ExpectValid(kOverlapping, PairsOnly(corners), a, At({1, 1, kLeast}));
+  ExpectValid(kOverlapping, PairsOnly(corners), a, At({1, 1, kMin}));
   ExpectInvalid(kOverlapping, PairsOnly(corners), a, At({1, 1, 0}), "0 is not inside");
-  ExpectInvalid(kOverlapping, PairsOnly(corners), a, At({1, 1, -kLeast}), "0 is not inside");
+  ExpectInvalid(kOverlapping, PairsOnly(corners), a, At({1, 1, -kMin}), "0 is not inside");
   ExpectInvalid(kOverlapping, PairsOnly({{0, 0}, {1, 0}, {2, 0}}), a, At({1, 1, 1}), "not inside");
   ExpectInvalid(kOverlapping, PairsOnly({{0, 0}, {1, 0}, {2, 0}, {2, 0}}), a, At({1, 1, 1}),
                 "not inside");
@@ -239,7 +239,7 @@ TEST(CertificateCheck, PairsMustBeVerticesOfTheHulls) {
   named.mutable_pairs(0)->mutable_vertex_a()->set_x(1);
   named.mutable_pairs(0)->mutable_vertex_b();
   ExpectValid(kTouching, named, a, b);
-  named.mutable_pairs(0)->mutable_vertex_a()->set_y(kLeast);
+  named.mutable_pairs(0)->mutable_vertex_a()->set_y(kMin);
   ExpectInvalid(kTouching, named, a, b, "pairs[0].a has other coordinates");
 }
 
@@ -278,10 +278,10 @@ TEST(CertificateCheck, OtherRelationsHaveNoCertificate) {
 
 TEST(CertificateCheck, TheWholeRangeOfDoublesIsExact) {
   const double huge = std::numeric_limits<double>::max();
-  ExpectValid(kSeparated, Direction(1, 0, 0), At({-huge, 0, 0, kLeast, 0, 0}),
-              At({huge, 0, 0, 2 * kLeast, 0, 0}));
-  ExpectInvalid(kSeparated, Direction(1, 0, 0), At({-huge, 0, 0, kLeast, 0, 0}),
-                At({huge, 0, 0, kLeast, 0, 0}), "does not separate");
+  ExpectValid(kSeparated, Direction(1, 0, 0), At({-huge, 0, 0, kMin, 0, 0}),
+              At({huge, 0, 0, 2 * kMin, 0, 0}));
+  ExpectInvalid(kSeparated, Direction(1, 0, 0), At({-huge, 0, 0, kMin, 0, 0}),
+                At({huge, 0, 0, kMin, 0, 0}), "does not separate");
   ExpectValid(kTouching, Direction(huge, 0, 0, {{0, 0}}), At({huge, 0, 0}, huge),
               At({huge, 0, 0}, huge));
 }

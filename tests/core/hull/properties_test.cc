@@ -238,8 +238,8 @@ TEST(HullProperties, CubesBeyondTheRangeOfDoublesSaturate) {
   const HullProperties small =
       ComputeProperties(BuildHull(Box(Vector::Zero(), Vector::Constant(0x1p-1000)))).value();
   EXPECT_EQ(small.volume.value, 0);
-  EXPECT_EQ(small.volume.bound, kLeastDouble);
-  EXPECT_EQ(small.area.value, kLeastDouble);
+  EXPECT_EQ(small.volume.bound, kMinDouble);
+  EXPECT_EQ(small.area.value, kMinDouble);
   ExpectExact(small.centroid[0], 0x1p-1001);
   const HullProperties large =
       ComputeProperties(BuildHull(Box(Vector::Zero(), Vector::Constant(0x1p1000)))).value();

@@ -53,16 +53,16 @@ TEST(RoundToNearest, TiesGoToTheEvenNeighbor) {
   EXPECT_EQ(RoundToNearest(odd, 1, 0).bound, 1);
   EXPECT_EQ(RoundToNearest(-odd - 2, 1, 0).value, -(0x1p53 + 4));
   // Subnormal numbers: 2.5 and 3.5 times the least double.
-  EXPECT_EQ(RoundToNearest(5, 1, -1075).value, 2 * kLeastDouble);
-  EXPECT_EQ(RoundToNearest(7, 1, -1075).value, 4 * kLeastDouble);
-  EXPECT_EQ(RoundToNearest(7, 1, -1075).bound, kLeastDouble);
+  EXPECT_EQ(RoundToNearest(5, 1, -1075).value, 2 * kMinDouble);
+  EXPECT_EQ(RoundToNearest(7, 1, -1075).value, 4 * kMinDouble);
+  EXPECT_EQ(RoundToNearest(7, 1, -1075).bound, kMinDouble);
 }
 
 TEST(RoundToNearest, TheEndsOfTheRangeSaturate) {
   EXPECT_EQ(RoundToNearest(1, 1, -1075).value, 0);
   EXPECT_EQ(RoundToNearest(-1, 1, -9000).value, 0);
   EXPECT_FALSE(std::signbit(RoundToNearest(-1, 1, -9000).value));
-  EXPECT_EQ(RoundToNearest(-1, 1, -9000).bound, kLeastDouble);
+  EXPECT_EQ(RoundToNearest(-1, 1, -9000).bound, kMinDouble);
   EXPECT_EQ(RoundToNearest(1, 1, 1024).value, kLargestDouble);
   EXPECT_EQ(RoundToNearest(1, 1, 1024).bound, kInfinity);
   EXPECT_EQ(RoundToNearest(-5, 3, 9000).value, -kLargestDouble);
@@ -123,7 +123,7 @@ TEST(RoundRootMinus, SignsAndZerosAreExact) {
   EXPECT_EQ(RoundRootMinus(-1, 25, 1, 0, {1, 1}).value, -7);
   EXPECT_EQ(RoundRootMinus(0, 0, 1, 0, {3, -1}).value, -1.5);
   EXPECT_EQ(RoundRootMinus(-1, 1, 1, 1023, {1, 1023}).bound, kInfinity);
-  EXPECT_EQ(RoundRootMinus(1, 2, 1, -3000, {1, -3000}).value, kLeastDouble);
+  EXPECT_EQ(RoundRootMinus(1, 2, 1, -3000, {1, -3000}).value, kMinDouble);
 }
 
 TEST(RoundRootMinus, IsWithinItsBound) {

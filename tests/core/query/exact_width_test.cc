@@ -23,7 +23,7 @@ namespace exact_width_test {
 
 constexpr ExactWidth kWidths[] = {ExactWidth::k1Word, ExactWidth::k2Words, ExactWidth::k3Words,
                                   ExactWidth::k5Words, ExactWidth::kAny};
-constexpr int kMostBits[] = {55, 119, 183, 311, std::numeric_limits<int>::max()};
+constexpr int kMaxBits[] = {55, 119, 183, 311, std::numeric_limits<int>::max()};
 constexpr size_t kWidthCount = std::size(kWidths);
 
 // Runs a query in all widths that are sufficient, from scratch and from the final state of floating
@@ -54,7 +54,7 @@ class WidthCheck {
       if (!expected) expected = wanted->relation;
       for (size_t i = 0; i < kWidthCount; ++i) {
         const auto found = SearchExactly(pair, from, true, {}, kWidths[i]);
-        const bool fits = !is_small ? kWidths[i] == ExactWidth::kAny : frame.bits <= kMostBits[i];
+        const bool fits = !is_small ? kWidths[i] == ExactWidth::kAny : frame.bits <= kMaxBits[i];
         if (found.ok() && !fits)
           return testing::AssertionFailure() << "width " << i << " too narrow";
         if (!found.ok()) continue;

@@ -20,7 +20,7 @@ enum class Magnitudes { kTame, kCommon, kAny };
 constexpr Magnitudes kChoices[] = {Magnitudes::kTame,   Magnitudes::kTame,   Magnitudes::kTame,
                                    Magnitudes::kTame,   Magnitudes::kCommon, Magnitudes::kCommon,
                                    Magnitudes::kCommon, Magnitudes::kAny};
-constexpr size_t kMostUnlikePoints = 120;
+constexpr size_t kMaxUnlikePoints = 120;
 
 class Decoder {
  public:
@@ -28,9 +28,9 @@ class Decoder {
 
   FuzzCloud Run() {
     Scatter cuts(in_.Byte());
-    const int longest = in_.Byte() % 2 == 0 ? 12 : static_cast<int>(kMostPoints);
+    const int longest = in_.Byte() % 2 == 0 ? 12 : static_cast<int>(kMaxPoints);
     magnitudes_ = kChoices[in_.Below(std::size(kChoices))];
-    const size_t most = magnitudes_ == Magnitudes::kAny ? kMostUnlikePoints : kMostPoints;
+    const size_t most = magnitudes_ == Magnitudes::kAny ? kMaxUnlikePoints : kMaxPoints;
     common_power_ = in_.PowerOfTwo();
     while (!in_.empty() && cloud_.points.size() < most) Step();
     cloud_.points.resize(std::min(cloud_.points.size(), most));

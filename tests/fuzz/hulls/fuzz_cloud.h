@@ -18,14 +18,14 @@ struct FuzzCloud {
   std::vector<size_t> block_sizes;
 };
 
-// Decodes any bytes into a cloud of at most kMostPoints points. The bytes are a program: small
+// Decodes any bytes into a cloud of at most kMaxPoints points. The bytes are a program: small
 // integers, raw doubles, repeated points, neighbors one unit in the last place away, points on the
 // lines and in the planes of earlier points (exactly or up to rounding), powers of two from the
 // subnormals to the largest doubles, runs, grids, and scatters. So cases that are rare among random
 // coordinates are common here. Deterministic.
 FuzzCloud DecodeFuzzCloud(std::span<const uint8_t> bytes);
 
-inline constexpr size_t kMostPoints = 400;
+inline constexpr size_t kMaxPoints = 400;
 
 }  // namespace hulld::fuzz
 

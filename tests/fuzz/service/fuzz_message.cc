@@ -18,7 +18,7 @@ using google::protobuf::OneofDescriptor;
 using google::protobuf::Reflection;
 using google::protobuf::UnknownFieldSet;
 
-constexpr int kMostDepth = 8;
+constexpr int kMaxDepth = 8;
 constexpr double kLargest = 1e308;
 constexpr double kTiny = std::numeric_limits<double>::denorm_min();
 
@@ -132,7 +132,7 @@ class MessageFiller {
       case FieldDescriptor::CPPTYPE_STRING:
         return r.SetString(message, field, String(*field));
       case FieldDescriptor::CPPTYPE_MESSAGE:
-        if (depth < kMostDepth) Fill(r.MutableMessage(message, field), depth + 1);
+        if (depth < kMaxDepth) Fill(r.MutableMessage(message, field), depth + 1);
         return;
     }
   }
@@ -158,7 +158,7 @@ class MessageFiller {
           r.AddString(message, field, String(*field));
           break;
         case FieldDescriptor::CPPTYPE_MESSAGE:
-          if (depth < kMostDepth) Fill(r.AddMessage(message, field), depth + 1);
+          if (depth < kMaxDepth) Fill(r.AddMessage(message, field), depth + 1);
           break;
         default:
           return;
@@ -288,7 +288,7 @@ class MessageFiller {
       case 2:
         return fields->AddLengthDelimited(number, std::string(in_.Byte(), '\xff'));
       default:
-        if (depth < kMostDepth) AddUnknown(fields->AddGroup(number), depth + 1);
+        if (depth < kMaxDepth) AddUnknown(fields->AddGroup(number), depth + 1);
     }
   }
 

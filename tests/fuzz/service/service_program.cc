@@ -16,10 +16,10 @@ namespace {
 
 using server::Rpc;
 
-constexpr int kMostCalls = 24;
+constexpr int kMaxCalls = 24;
 // Every call of a program is short; one that exceeds this has hung.
 constexpr std::chrono::seconds kPatience(60);
-constexpr int kMostComparedPlacements = 7;
+constexpr int kMaxComparedPlacements = 7;
 
 // A server stream with its context.
 template <typename Response>
@@ -53,7 +53,7 @@ bool ChangesHulls(Rpc rpc) {
 }
 
 std::string ServiceProgram::Run() {
-  for (int i = 0; i < kMostCalls && !in_.empty() && finding_.empty(); ++i) Step();
+  for (int i = 0; i < kMaxCalls && !in_.empty() && finding_.empty(); ++i) Step();
   idle_.clear();
   return finding_;
 }
@@ -578,7 +578,7 @@ void ServiceProgram::FindCollisions() {
   }
   Note(CheckScene(sent, parts));
   const bool comparable =
-      request.placements_size() > 1 && request.placements_size() <= kMostComparedPlacements &&
+      request.placements_size() > 1 && request.placements_size() <= kMaxComparedPlacements &&
       request.tolerance() == 0 && !request.wanted().has_clearance() && !request.first_only();
   if (comparable && finding_.empty()) CompareSceneWithBatch(request, parts);
 }

@@ -13,7 +13,7 @@ namespace {
 using server::Rpc;
 
 // The limit of a batch.
-constexpr int kMostComparedPairs = 60;
+constexpr int kMaxComparedPairs = 60;
 
 // Returns the rank of a relation among those of pieces.
 int Strength(v1::Relation relation) {
@@ -173,7 +173,7 @@ void ServiceProgram::CompareWithPieces(const v1::CheckCollisionRequest& request,
                                      (request.b().has_pose() || request.b().radius() != 0));
   const bool is_known =
       bodies_.contains(request.b().hull_id()) || hulls_.contains(request.b().hull_id());
-  if (is_elsewhere || !is_known || a.size() * b.size() > kMostComparedPairs) return;
+  if (is_elsewhere || !is_known || a.size() * b.size() > kMaxComparedPairs) return;
   v1::BatchCheckCollisionsRequest batch;
   *batch.mutable_placements() = a;
   batch.mutable_placements()->MergeFrom(b);

@@ -13,7 +13,7 @@ namespace {
 using server::Rpc;
 
 // The limit of a batch.
-constexpr int kMostComparedPairsOfWatch = 120;
+constexpr int kMaxComparedPairsOfWatch = 120;
 
 }  // namespace
 
@@ -198,7 +198,7 @@ void ServiceProgram::WatchCollisions() {
 
 void ServiceProgram::CompareWatchWithBatch(const CollisionWatchCheck& check) {
   const v1::BatchCheckCollisionsRequest batch = check.AsBatch();
-  if (batch.pairs_size() > kMostComparedPairsOfWatch) return;
+  if (batch.pairs_size() > kMaxComparedPairsOfWatch) return;
   const std::vector<v1::Relation> relations = AskBatch(batch);
   std::map<std::pair<uint32_t, uint32_t>, v1::Relation> expected;
   for (size_t i = 0; i < relations.size(); ++i) {

@@ -183,7 +183,7 @@ TEST_F(BodyCalls, BodiesCountAmongHulls) {
   Create("h");
   ASSERT_TRUE(PutBody("b", {PlacementOf("h")}).ok());
   const auto third = PutBody("c", {PlacementOf("h")});
-  EXPECT_THAT(TextOf(third.status()), HasSubstr("holds 1 hulls and 1 bodies; the limit is 2"));
+  EXPECT_THAT(TextOf(third.status()), HasSubstr("contains 1 hulls and 1 bodies; the limit is 2"));
   // A replacement does not add to the count.
   EXPECT_TRUE(PutBody("b", {PlacementOf("h"), PlacementOf("h")}).ok());
   EXPECT_TRUE(absl::IsResourceExhausted(MakeClient().CreateHull("d").status()));

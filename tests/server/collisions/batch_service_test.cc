@@ -400,7 +400,7 @@ TEST_F(BatchCall, AMalformedBatchFailsAsAWhole) {
   v1::BatchCheckCollisionsRequest request;
   *request.add_placements() = PlacementOf("cube");
   request.add_pairs(0);
-  ExpectRefused(request, grpc::StatusCode::INVALID_ARGUMENT, "pairs holds 1 indices");
+  ExpectRefused(request, grpc::StatusCode::INVALID_ARGUMENT, "pairs has 1 indices");
   request.add_pairs(1);
   ExpectRefused(request, grpc::StatusCode::INVALID_ARGUMENT,
                 "pairs[1] is 1, but there is 1 placement");
@@ -411,7 +411,7 @@ TEST_F(BatchCall, AMalformedBatchFailsAsAWhole) {
   request.set_method(v1::METHOD_UNSPECIFIED);
   for (int i = 0; i < 2; ++i) AddPair(&request, 0, 0);
   ExpectRefused(request, grpc::StatusCode::RESOURCE_EXHAUSTED,
-                "the batch holds 3 pairs; the limit is 2 (--max-pairs-per-batch)");
+                "the batch has 3 pairs; the limit is 2 (--max-pairs-per-batch)");
 }
 
 TEST_F(BatchCall, LongBatchesStreamInMessagesOfAMebibyte) {

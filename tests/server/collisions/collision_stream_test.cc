@@ -324,7 +324,7 @@ TEST_F(StreamCollisionsCall, ErrorsNameTheMessageAndTheField) {
   ExpectRefused({v1::StreamCollisionsRequest()}, kInvalid, "set open or update");
   ExpectRefused({MoveX(0, 1)}, kInvalid, "the first message must be open");
   ExpectRefused({open, open}, kInvalid, "open was sent twice");
-  ExpectRefused({Open({PlacementOf("cube")}, {0})}, kInvalid, "open: pairs holds 1 indices");
+  ExpectRefused({Open({PlacementOf("cube")}, {0})}, kInvalid, "open: pairs has 1 indices");
   ExpectRefused({Open({PlacementOf("cube")}, {0, 1})}, kInvalid,
                 "open: pairs[1] is 1, but there is 1 placement");
   auto negative = open;
@@ -337,12 +337,12 @@ TEST_F(StreamCollisionsCall, ErrorsNameTheMessageAndTheField) {
                 "update 1: poses[1].rotation is zero");
   auto few = MoveX(0, 1);
   few.mutable_update()->mutable_poses()->RemoveLast();
-  ExpectRefused({open, few}, kInvalid, "update 1: poses holds 6 numbers for 1 placements");
+  ExpectRefused({open, few}, kInvalid, "update 1: poses has 6 numbers for 1 placements");
   Config config = TestConfig();
   config.limits.max_pairs_per_batch = 1;
   Restart(config);
   ExpectRefused({Open({PlacementOf("cube")}, {0, 0, 0, 0})}, grpc::StatusCode::RESOURCE_EXHAUSTED,
-                "the stream holds 2 pairs; the limit is 1 (--max-pairs-per-batch)");
+                "the stream has 2 pairs; the limit is 1 (--max-pairs-per-batch)");
 }
 
 TEST_F(StreamCollisionsCall, LongAnswersComeInPiecesOfAMebibyte) {

@@ -144,7 +144,7 @@ TEST_F(MovingPlacements, PackedMotionsAnswerAsListed) {
 
   list.mutable_end_poses()->RemoveLast();
   EXPECT_THAT(Ask(packed).status().message(),
-              HasSubstr("packed_placements.end_poses holds 13 numbers for 2 placements"));
+              HasSubstr("packed_placements.end_poses has 13 numbers for 2 placements"));
 }
 
 TEST_F(MovingPlacements, AnswersAtRestHaveNoTimes) {
@@ -304,7 +304,7 @@ TEST_F(MovingPlacements, StreamsAndWatchesRefuseThem) {
     const auto stream = client().OpenCollisionStream()->Open(open);
     EXPECT_EQ(stream.status().message(),
               absl::StrCat("open: ", expected,
-                           "a stream takes no motions; use CheckCollision, "
+                           "a stream does not support motions; use CheckCollision, "
                            "BatchCheckCollisions, or FindCollisions"));
     grpc::ClientContext context;
     const auto watch = collisions_->WatchCollisions(&context);
@@ -314,7 +314,7 @@ TEST_F(MovingPlacements, StreamsAndWatchesRefuseThem) {
     watch->Write(first);
     const grpc::Status watched = watch->Finish();
     EXPECT_EQ(watched.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
-    EXPECT_THAT(watched.error_message(), HasSubstr(expected + "a watch takes no motions"));
+    EXPECT_THAT(watched.error_message(), HasSubstr(expected + "a watch does not support motions"));
   }
 }
 

@@ -47,7 +47,7 @@ TEST_F(SceneMemory, AnUnreadSceneIsCountedAndBounded) {
   constexpr int kPlacements = 200'000;
   // Placed hulls, their boxes twice, the tree.
   constexpr double kLeast = kPlacements * 300.0;
-  constexpr double kMost = kPlacements * 700.0 + (16 << 20);
+  constexpr double kMax = kPlacements * 700.0 + (16 << 20);
   Put("cube", Cube());
   const double before = Metric("hulld_cache_bytes");
   v1::FindCollisionsRequest request = Heap(kPlacements);
@@ -61,7 +61,7 @@ TEST_F(SceneMemory, AnUnreadSceneIsCountedAndBounded) {
   grpc::ClientContext read_context;
   const auto read = collisions_->FindCollisions(&read_context, Heap(1500));
   v1::FindCollisionsResponse part;
-  while (read->Read(&part)) EXPECT_LT(Metric("hulld_cache_bytes") - before, kMost);
+  while (read->Read(&part)) EXPECT_LT(Metric("hulld_cache_bytes") - before, kMax);
   ASSERT_TRUE(read->Finish().ok());
   EXPECT_EQ(part.totals().overlapping(), 1500u * 1499 / 2);
   // 2e10 pairs in total.

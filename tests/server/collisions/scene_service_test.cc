@@ -196,10 +196,10 @@ TEST_F(FindCollisionsCall, ErrorsNameTheField) {
   Put("cube", Cube());
   auto request = Row({0, 1});
   request.add_groups(1);
-  ExpectRefused(request, "groups holds 1 groups for 2 placements");
+  ExpectRefused(request, "groups has 1 groups for 2 placements");
   request.add_groups(2);
   request.add_ignored_group_pairs(1);
-  ExpectRefused(request, "ignored_group_pairs holds 1 groups; each pair needs two");
+  ExpectRefused(request, "ignored_group_pairs has 1 groups; each pair needs two");
   request.clear_groups();
   request.add_ignored_group_pairs(1);
   ExpectRefused(request, "ignored_group_pairs requires groups");

@@ -330,8 +330,8 @@ TEST_F(InlineShapes, MalformedOnesAreRefusedByName) {
   ExpectRefused(Pair(Shape({0, 0, 0, 1, nan, 1}), good), "a.points[1].y is NaN");
   ExpectRefused(Pair(good, Shape({0, 0, infinity})), "b.points[0].z is infinite");
   ExpectRefused(Pair(good, Shape({})), "b.points is empty; give 1 to 4096");
-  ExpectRefused(Pair(Shape({1, 2}), good), "a.points.xyz holds 2 numbers; each point needs three");
-  ExpectRefused(Pair(Shape(Coordinates(3 * 4097)), good), "a.points holds 4097 points");
+  ExpectRefused(Pair(Shape({1, 2}), good), "a.points.xyz has 2 numbers; each point needs three");
+  ExpectRefused(Pair(Shape(Coordinates(3 * 4097)), good), "a.points has 4097 points");
   EXPECT_EQ(Check(Pair(Shape(Coordinates(3 * 4096)), good)).relation(), v1::RELATION_TOUCHING);
   v1::Placement both = good;
   both.set_hull_id("cube");
@@ -392,16 +392,16 @@ TEST_F(InlineShapes, PackedListsMustMatch) {
     return std::string(status.message());
   };
   EXPECT_THAT(refusal(), HasSubstr("packed_placements.shape_sizes add up to 2 points, but "
-                                   "shape_points holds 1"));
+                                   "shape_points has 1"));
   packed.set_shape_sizes(0, 1);
   EXPECT_TRUE(Find(request).ok());
   packed.set_hulls(0, 1);
   EXPECT_THAT(refusal(),
               HasSubstr("packed_placements.hulls[0] is 1, but packed_placements.hull_ids "
-                        "holds 0 and shape_sizes 1"));
+                        "has 0 and shape_sizes 1"));
   packed.set_hulls(0, 0);
   packed.mutable_shape_points()->add_xyz(0);
-  EXPECT_THAT(refusal(), HasSubstr("packed_placements.shape_points.xyz holds 4 numbers"));
+  EXPECT_THAT(refusal(), HasSubstr("packed_placements.shape_points.xyz has 4 numbers"));
 }
 
 TEST_F(InlineShapes, CountAsRequestMemory) {

@@ -274,7 +274,7 @@ TEST_F(WatchCollisions, RefusesMalformedRequests) {
   expect(Refused(clearance), "open: clearance is -1");
   v1::CollisionWatchOpen groups = open;
   groups.add_groups(1);
-  expect(Refused(groups), "groups holds 1 groups for 2 placements");
+  expect(Refused(groups), "groups has 1 groups for 2 placements");
   {
     Watch watch(*collisions_, open);
     watch.Move(2, 0);

@@ -266,7 +266,7 @@ TEST_F(AppendPoints, MalformedMessagesGetAClearError) {
   expect({OpenMessage("a//b", "w")}, "open.hull_id \"a//b\" has an empty segment");
   expect({OpenMessage("h", std::string(257, 'w'))}, "open.writer_id has 257");
   expect({open, ChunkMessage(0, Cube())}, "sequences start at 1");
-  expect({open, ChunkMessage(1, {1, 2, 3, 4})}, "chunk 1: points.xyz holds 4 numbers");
+  expect({open, ChunkMessage(1, {1, 2, 3, 4})}, "chunk 1: points.xyz has 4 numbers");
   v1::AppendPointsRequest both = ChunkMessage(1, {1, 2, 3});
   both.mutable_chunk()->mutable_points()->add_xyz_float(1);
   expect({open, both}, "chunk 1: points has both xyz and xyz_float");
@@ -286,7 +286,7 @@ TEST_F(AppendPoints, LimitsNameTheirFlags) {
     EXPECT_THAT(status.error_message(), HasSubstr(what));
   };
   expect({OpenMessage("h", "w"), ChunkMessage(1, Coordinates(33, 1.0))},
-         "message holds 11 points; the limit is 10 (--max-points-per-chunk)");
+         "message contains 11 points; the limit is 10 (--max-points-per-chunk)");
   expect({OpenMessage("other", "w", true)}, "the limit is 1 (--max-hulls)");
   const Coordinates sphere = Sphere(16);
   const Coordinates half(sphere.begin(), sphere.begin() + 24);

@@ -116,7 +116,7 @@ TEST_F(HullCalls, TheNumberOfHullsIsLimited) {
   const grpc::Status status = TryCreate("c", false, &response);
   EXPECT_EQ(status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
   EXPECT_THAT(status.error_message(),
-              HasSubstr("the store holds 2 hulls; the limit is 2 (--max-hulls)"));
+              HasSubstr("the store contains 2 hulls; the limit is 2 (--max-hulls)"));
   EXPECT_TRUE(TryCreate("b", true, &response).ok());
   ASSERT_TRUE(Delete("a").ok());
   EXPECT_TRUE(TryCreate("c", false, &response).ok());

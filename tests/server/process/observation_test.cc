@@ -181,7 +181,7 @@ TEST_F(Observation, OpenAndRunningCallsAreShown) {
 TEST_F(Observation, TokensAreCountedByNameUpToALimit) {
   server::Metrics metrics;
   metrics.CountToken("");
-  for (size_t i = 0; i < server::Metrics::kMostTokens + 7; ++i)
+  for (size_t i = 0; i < server::Metrics::kMaxTokens + 7; ++i)
     metrics.CountToken("t" + std::to_string(i));
   metrics.CountToken("t0");
   const std::string text = prometheus::TextSerializer().Serialize(metrics.Collect());

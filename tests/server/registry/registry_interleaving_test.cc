@@ -79,7 +79,7 @@ TEST_F(RegistryInterleaving, ManyReadersOfOneHullReadItOnce) {
 // While a thread reads a part of a slice, another one reads the rest.
 TEST_F(RegistryInterleaving, ManyHullsAreReadByManyThreads) {
   constexpr int kHulls = 300;
-  constexpr int kSlice = static_cast<int>(kMostLookupsPerHold) - 1;
+  constexpr int kSlice = static_cast<int>(kMaxLookupsPerHold) - 1;
   constexpr int kLost = 7;
   std::vector<std::string> ids;
   std::vector<AppendSession> sessions;
@@ -115,7 +115,7 @@ TEST_F(RegistryInterleaving, ManyHullsAreReadByManyThreads) {
     EXPECT_EQ(hull->record.counts.received, 9);
     EXPECT_EQ(hull->served->high().x(), 100);
   }
-  EXPECT_LE(registry_.Holds().most_lookups, kMostLookupsPerHold);
+  EXPECT_LE(registry_.Holds().max_lookups, kMaxLookupsPerHold);
 }
 
 // The next hulls are read while the first are looked up. Hulls deleted in the interim are not

@@ -15,7 +15,7 @@
 namespace hulld::server {
 namespace registry_lookup_test {
 
-constexpr uint64_t kMost = kMostLookupsPerHold;
+constexpr uint64_t kMax = kMaxLookupsPerHold;
 
 class RegistryLookup : public ::testing::Test {
  protected:
@@ -40,9 +40,9 @@ class RegistryLookup : public ::testing::Test {
 TEST_F(RegistryLookup, TheMutexIsHeldForAFewLookupsAtATime) {
   const std::vector<std::string> ids = Create(1000);
   ASSERT_TRUE(registry_.Resolve(ids, {}).ok());
-  EXPECT_EQ(registry_.Holds().most_lookups, kMost);
+  EXPECT_EQ(registry_.Holds().max_lookups, kMax);
   ASSERT_TRUE(registry_.reader().TryResolve(ids).has_value());
-  EXPECT_EQ(registry_.Holds().most_lookups, kMost);
+  EXPECT_EQ(registry_.Holds().max_lookups, kMax);
   EXPECT_GT(registry_.Holds().longest, std::chrono::nanoseconds(0));
 }
 
@@ -89,7 +89,7 @@ TEST_F(RegistryLookup, ChangesBetweenTwoSlicesAreLookedUpAgain) {
   EXPECT_TRUE(absl::IsNotFound(resolved->hulls[250].status()));
   EXPECT_TRUE(resolved->hulls[1000].ok());
   EXPECT_EQ(resolved->as_of.revision, registry_.Sizes().store_revision);
-  EXPECT_EQ(registry_.Holds().most_lookups, kMost);
+  EXPECT_EQ(registry_.Holds().max_lookups, kMax);
 }
 
 // A writer appends to one hull, then to the next, and so on: no reader sees the second ahead of the
@@ -157,24 +157,24 @@ TEST_F(RegistryLookup, ARefreshAfterMoreChangesThanAreKnownLooksUpAll) {
   ASSERT_TRUE(hulls_.Put(ids[7], CubeCorners()).ok());
   const AppendSession session = hulls_.Open("another")->session;
   std::promise<void> done;
-  for (uint64_t sequence = 1; sequence <= RecentChanges::kMost; ++sequence) {
+  for (uint64_t sequence = 1; sequence <= RecentChanges::kCapacity; ++sequence) {
     registry_.hulls().Append(session, {sequence, {{0, 0, 0}}, std::nullopt}, {}, {},
                              [&, sequence](const absl::StatusOr<ChunkResult>& result) {
                                EXPECT_TRUE(result.ok());
-                               if (sequence == RecentChanges::kMost) done.set_value();
+                               if (sequence == RecentChanges::kCapacity) done.set_value();
                              });
   }
   done.get_future().wait();
   const uint64_t before = Lookups();
   EXPECT_EQ(registry_.reader().Refresh(ids, known, {})->hulls[7]->record.vertex_count, 8);
   EXPECT_EQ(Lookups(), before + 300);
-  EXPECT_LE(registry_.Holds().most_lookups, kMost);
+  EXPECT_LE(registry_.Holds().max_lookups, kMax);
 }
 
 TEST_F(RegistryLookup, ALookupCanBeCancelledBetweenSlices) {
   const std::vector<std::string> ids = Create(1000);
   EXPECT_TRUE(absl::IsCancelled(registry_.Resolve(ids, [] { return true; }).status()));
-  EXPECT_LE(Lookups(), kMost);
+  EXPECT_LE(Lookups(), kMax);
 }
 
 // A waiting thread gets the mutex before the thread that releases it and locks it again.

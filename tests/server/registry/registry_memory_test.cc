@@ -56,7 +56,7 @@ TEST_F(RegistryMemory, EachOfManyHullsIsReadOnce) {
     EXPECT_EQ(registry.Cache().misses, 500);
     EXPECT_EQ(registry.Cache().hits, round == 0 ? 1 : 501);
   }
-  EXPECT_LE(registry.Holds().most_lookups, kMostLookupsPerHold);
+  EXPECT_LE(registry.Holds().max_lookups, kMaxLookupsPerHold);
 }
 
 TEST_F(RegistryMemory, AHullThatIsOnlyReadNeedsNoBuilder) {

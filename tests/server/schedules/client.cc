@@ -34,7 +34,7 @@ void Client::Run() {
        {plan.pressure, &Client::Press}}};
   uint32_t total = 0;
   for (const auto& [weight, method] : methods) total += weight;
-  for (uint32_t calls = 1 + random().Below(kMostCalls); calls > 0; --calls) {
+  for (uint32_t calls = 1 + random().Below(kMaxCalls); calls > 0; --calls) {
     uint32_t chosen = random().Below(total);
     for (const auto& [weight, method] : methods) {
       if (chosen < weight) {

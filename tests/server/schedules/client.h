@@ -22,7 +22,7 @@ class Client {
   explicit Client(Simulation& simulation) : simulation_(simulation) {}
 
   // A few sequential calls.
-  static constexpr uint32_t kMostCalls = 3;
+  static constexpr uint32_t kMaxCalls = 3;
   void Run();
 
   // Checks the answers of a reopened registry against the contents of the store.

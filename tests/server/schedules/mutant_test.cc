@@ -12,7 +12,7 @@
 namespace hulld::server {
 namespace mutant_test {
 
-constexpr uint64_t kMost = 300'000;
+constexpr uint64_t kMax = 300'000;
 // **Observed**: the rarest defect, AListIsOfALaterMoment, is found within 33,235 schedules from
 // here.
 constexpr uint64_t kFirstSeed = 1'000'001;
@@ -23,7 +23,7 @@ int ExploreElsewhere() {
   const pid_t child = fork();
   if (child == 0) {
     Reached reached;
-    const auto found = Explore(NumberIn("HULLD_TEST_SEED", kFirstSeed), kMost, reached);
+    const auto found = Explore(NumberIn("HULLD_TEST_SEED", kFirstSeed), kMax, reached);
     if (!found.has_value()) _exit(0);
     std::fputs(Report(*found).c_str(), stderr);
     _exit(1);
@@ -37,7 +37,7 @@ TEST(Mutant, HULLD_MUTANT) {
   const int status = ExploreElsewhere();
   const bool is_reported = WIFEXITED(status) && WEXITSTATUS(status) == 1;
   const bool is_broken = WIFSIGNALED(status) && WTERMSIG(status) == SIGABRT;
-  EXPECT_TRUE(is_reported || is_broken) << "not found by " << kMost << " schedules: " << status;
+  EXPECT_TRUE(is_reported || is_broken) << "not found by " << kMax << " schedules: " << status;
 }
 
 }  // namespace mutant_test

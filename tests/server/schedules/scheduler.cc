@@ -31,7 +31,7 @@ Fiber* TakeFiber() {
 constexpr size_t kNobody = SIZE_MAX;
 // Approximate number of steps of a schedule: the range of the priority changes.
 constexpr uint32_t kUsualSteps = 800;
-constexpr uint32_t kMostChangePoints = 5;
+constexpr uint32_t kMaxChangePoints = 5;
 
 std::string LineOf(const std::source_location& where) {
   const std::string_view file = where.file_name();
@@ -48,7 +48,7 @@ Scheduler& Scheduler::Current() {
 Scheduler::Scheduler(uint64_t seed) : choices_(seed), random_(choices_.Next()) {
   by_priority_ = choices_.OneIn(2);
   if (by_priority_) {
-    const uint32_t count = choices_.Below(kMostChangePoints + 1);
+    const uint32_t count = choices_.Below(kMaxChangePoints + 1);
     for (uint32_t i = 0; i < count; ++i) change_points_.push_back(choices_.Below(kUsualSteps));
     std::ranges::sort(change_points_, std::greater<>());
   } else {
@@ -117,9 +117,9 @@ void Scheduler::Suspend() { threads_[running_].fiber->Suspend(); }
 
 // Switches to the thread whose turn is next, and returns when it is the turn of this thread.
 void Scheduler::GoOn() {
-  if (steps_.size() > kMostSteps) {
+  if (steps_.size() > kMaxSteps) {
     fault_ = {ScheduleFault::Kind::kLivelock,
-              absl::StrCat("the schedule did not end within ", kMostSteps, " steps")};
+              absl::StrCat("the schedule did not end within ", kMaxSteps, " steps")};
     while (true) Suspend();
   }
   ++now_;

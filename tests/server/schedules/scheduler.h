@@ -48,7 +48,7 @@ struct ScheduleFault {
 class Scheduler {
  public:
   // A schedule with more steps counts as nonterminating. **Observed**: at most 3000.
-  static constexpr size_t kMostSteps = 100'000;
+  static constexpr size_t kMaxSteps = 100'000;
   static constexpr int64_t kNoDeadline = -1;
 
   using Location = std::source_location;

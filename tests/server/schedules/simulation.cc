@@ -17,7 +17,7 @@ namespace {
 
 constexpr uint64_t kPlentyOfMemory = uint64_t{1} << 30;
 // Upper bound for a body of one piece.
-constexpr uint64_t kMostBytesOfBody = 512;
+constexpr uint64_t kMaxBytesOfBody = 512;
 
 // Checks the statistics of an idle registry: it has the contents of the store, can evict all of
 // them, and then counts nothing.
@@ -55,9 +55,9 @@ void CheckAtRest(const Simulation& simulation) {
   const CacheStatistics cache = registry.Cache();
   simulation.reached.evictions += cache.evictions;
   // A preparation in progress is held slightly longer, and so are recently put bodies: each client
-  // puts kMostCalls at most.
-  if (simulation.plan.bodies > 0) bodies += simulation.plan.clients * Client::kMostCalls;
-  if (simulation.plan.preparations > 0 || cache.bytes <= bodies * kMostBytesOfBody) return;
+  // puts kMaxCalls at most.
+  if (simulation.plan.bodies > 0) bodies += simulation.plan.clients * Client::kMaxCalls;
+  if (simulation.plan.preparations > 0 || cache.bytes <= bodies * kMaxBytesOfBody) return;
   scheduler.Fail(absl::StrCat("nothing is in use, but ", cache.bytes,
                               " bytes are counted: ", cache.reading_bytes, " for readers and ",
                               cache.writing_bytes, " for writers"));

@@ -125,7 +125,7 @@ TEST_F(StoreLoss, AnIntactStoreIsAccepted) {
 TEST_F(StoreLoss, ALogTruncatedWithinARecordIsRefused) {
   PutInLogsOfTheirOwn({"a"});
   fs::resize_file(Logs()[0], fs::file_size(Logs()[0]) - 10);
-  ExpectLoss("holds");
+  ExpectLoss(" has ");
 }
 
 TEST_F(StoreLoss, ALogTruncatedBetweenRecordsIsRefused) {
@@ -142,7 +142,7 @@ TEST_F(StoreLoss, ALogTruncatedBetweenRecordsIsRefused) {
   hulls_ = nullptr;
   fs::copy(directory_ + "/data", Left(), fs::copy_options::recursive);
   fs::resize_file(Logs().back(), end_of_record);
-  ExpectLoss("holds");
+  ExpectLoss(" has ");
 }
 
 TEST_F(StoreLoss, ALostChunkThatChangedNoVertexIsDetected) {
@@ -185,7 +185,7 @@ TEST_F(StoreLoss, EachMissingLogIsDetected) {
 TEST_F(StoreLoss, ATruncatedLogEndsTheHistoryBeforeLaterLogs) {
   PutInLogsOfTheirOwn({"a", "b", "c"});
   fs::resize_file(Logs()[1], 0);
-  ExpectLoss("holds 0 bytes");
+  ExpectLoss("has 0 bytes");
   absl::StatusOr<std::unique_ptr<RocksDbStore>> store = OpenStore("left");
   ASSERT_TRUE(store.ok()) << store.status();
   DurableRegistry hulls(*std::move(store));
@@ -222,7 +222,7 @@ TEST_F(StoreLoss, AnOlderCopyOfTheLogIsRefused) {
       fs::copy_file(directory_ + "/older/" + name, Logs().back(),
                     fs::copy_options::overwrite_existing);
     }
-    ExpectLoss("holds");
+    ExpectLoss(" has ");
   }
 }
 

@@ -5,8 +5,8 @@ import {runsOf} from 'hulld/panels/time_line.js';
 
 // Time from one waypoint to the next while playing, within limits for the whole.
 const WAYPOINT_MS = 600;
-const LEAST_MS = 3000;
-const MOST_MS = 30000;
+const MIN_MS = 3000;
+const MAX_MS = 30000;
 // Steps of the slider between two waypoints. A recording has only the waypoints.
 const STEPS = 16;
 
@@ -32,7 +32,7 @@ export class Joints {
     return {
       last,
       steps: this.connection.live ? STEPS : 1,
-      length: Math.min(Math.max(WAYPOINT_MS * last, LEAST_MS), MOST_MS),
+      length: Math.min(Math.max(WAYPOINT_MS * last, MIN_MS), MAX_MS),
       marks: () => runsOf(contacts),
       text: (moment) => `${Number((moment + 1).toFixed(2))} of ${last + 1}`,
       show: (moment, rest) => {

@@ -5,22 +5,22 @@ import {IDENTITY, poseAt, samePose, toWorld} from 'hulld/pose.js';
 import {RoundedShape} from 'hulld/rounded_shape.js';
 
 // Maximum number of objects drawn individually; more are drawn as a crowd, in few draw calls.
-const MOST_SINGLE_OBJECTS = 24;
+const MAX_SINGLE_OBJECTS = 24;
 
 // Maximum number of objects with labels and colors of their own.
-const MOST_NAMED_OBJECTS = 200;
+const MAX_NAMED_OBJECTS = 200;
 
 // Maximum number of poses that undo() can restore.
-const MOST_UNDONE = 200;
+const MAX_UNDONE = 200;
 
 // Bodies with more pairs of pieces than this are queried without a certificate.
-const MOST_PIECE_PAIRS = 1000;
+const MAX_PIECE_PAIRS = 1000;
 
 // Number of times at which a moving object must be inside the picture.
 const PATH_TIMES = [0, 0.25, 0.5, 0.75, 1];
 
 // Shapes with more vertices than this, and those of a crowd, are represented by their box.
-const MOST_CORNERS = 300;
+const MAX_CORNERS = 300;
 
 export class Model extends EventTarget {
   constructor() {
@@ -89,7 +89,7 @@ export class Model extends EventTarget {
   }
 
   addObjects(objects) {
-    const many = this.objects.length + objects.length > MOST_NAMED_OBJECTS;
+    const many = this.objects.length + objects.length > MAX_NAMED_OBJECTS;
     for (const object of objects) {
       const index = this.objects.length;
       this.objects.push({
@@ -114,12 +114,12 @@ export class Model extends EventTarget {
   }
 
   get isCrowd() {
-    return this.objects.length > MOST_SINGLE_OBJECTS;
+    return this.objects.length > MAX_SINGLE_OBJECTS;
   }
 
   // Returns true if there are too many objects for labels and colors of their own.
   get isNameless() {
-    return this.objects.length > MOST_NAMED_OBJECTS;
+    return this.objects.length > MAX_NAMED_OBJECTS;
   }
 
   // Returns the color in which an object is drawn. The two objects of the pair never share one.
@@ -237,7 +237,7 @@ export class Model extends EventTarget {
   // corners of its box.
   cornersOf(object, pose = object.pose) {
     const {xyz, vertexCount} = this.shapeOf(object);
-    if (vertexCount > MOST_CORNERS || this.isCrowd || this.roundedOf(object))
+    if (vertexCount > MAX_CORNERS || this.isCrowd || this.roundedOf(object))
       return this.boxCornersOf(object, pose);
     return Array.from(
         {length: vertexCount}, (_, i) => toWorld(pose, xyz.subarray(3 * i, 3 * i + 3)));
@@ -336,7 +336,7 @@ export class Model extends EventTarget {
   wantsCertificate(rest) {
     const counts = (this.pair || []).map((i) => this.bodyOf(this.objects[i])?.pieces.length ?? 0);
     const isPlain = counts.every((count) => count === 0);
-    return isPlain || (rest && Math.max(1, counts[0]) * Math.max(1, counts[1]) <= MOST_PIECE_PAIRS);
+    return isPlain || (rest && Math.max(1, counts[0]) * Math.max(1, counts[1]) <= MAX_PIECE_PAIRS);
   }
 
   // `rest`: true if the motion has ended.
@@ -346,7 +346,7 @@ export class Model extends EventTarget {
     object.pose = pose;
     if (rest && !samePose(object.rested, pose)) {
       this.history.push({index, pose: object.rested});
-      if (this.history.length > MOST_UNDONE) this.history.shift();
+      if (this.history.length > MAX_UNDONE) this.history.shift();
       object.rested = pose;
     }
     this.tell('pose', {indices: [index], rest});

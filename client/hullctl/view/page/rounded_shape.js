@@ -4,13 +4,13 @@ import {toWorld} from 'hulld/pose.js';
 import {Shape} from 'hulld/shape.js';
 
 // Directions in which the surface of a hull is sampled, and those of all hulls of a scene.
-const MOST_DIRECTIONS = 400;
-const MOST_IN_ALL = 8000;
-const LEAST_DIRECTIONS = 40;
+const MAX_DIRECTIONS = 400;
+const MAX_IN_ALL = 8000;
+const MIN_DIRECTIONS = 40;
 // The facets of hulls with more triangles are too small to be seen as flat.
-const MOST_TRIANGLES = 100;
+const MAX_TRIANGLES = 100;
 // Larger hulls are represented by their extreme vertices.
-const MOST_VERTICES = 300;
+const MAX_VERTICES = 300;
 
 function normalOf([a, b, c]) {
   const [u, v] = [b, c].map((p) => p.map((value, k) => value - a[k]));
@@ -23,11 +23,11 @@ function normalOf([a, b, c]) {
 // of its moved facets.
 function pointsAround(hull, radius, count) {
   const moved = (p, n) => p.map((value, k) => value + radius * n[k]);
-  const few = fewVertices(hull, MOST_VERTICES);
+  const few = fewVertices(hull, MAX_VERTICES);
   const xyz = Float64Array.from(few.flat());
   const points = directions(count).map((d) => moved(few[extremeVertex(xyz, d)], d));
   const {triangles} = hull;
-  if (triangles.length > 3 * MOST_TRIANGLES) return points;
+  if (triangles.length > 3 * MAX_TRIANGLES) return points;
   for (let t = 0; t < triangles.length; t += 3) {
     const corners =
         [...triangles.subarray(t, t + 3)].map((i) => [...hull.xyz.subarray(3 * i, 3 * i + 3)]);
@@ -44,8 +44,7 @@ export class RoundedShape extends Shape {
   // that share the directions.
   constructor(parts, center, share) {
     const count = Math.min(
-        MOST_DIRECTIONS,
-        Math.max(LEAST_DIRECTIONS, Math.floor(MOST_IN_ALL / share / parts.length)));
+        MAX_DIRECTIONS, Math.max(MIN_DIRECTIONS, Math.floor(MAX_IN_ALL / share / parts.length)));
     const points = [];
     const triangles = [];
     const rounded = parts.map(({hull, pose, radius}) => {

@@ -86,7 +86,7 @@ function isClosed(xyz, triangles) {
 }
 
 // Larger meshes are not checked for closedness, which takes a second for a million triangles.
-const MOST_TRIANGLES_TO_CLOSE = 400000;
+const MAX_TRIANGLES_TO_CLOSE = 400000;
 
 export class Shape {
   constructor(xyz, triangles, edges) {
@@ -220,8 +220,7 @@ export class MeshShape extends Shape {
   hasVolume() {
     if (this.closed === undefined) {
       this.closed = this.triangles.length > 0 &&
-          this.triangles.length / 3 <= MOST_TRIANGLES_TO_CLOSE &&
-          isClosed(this.xyz, this.triangles);
+          this.triangles.length / 3 <= MAX_TRIANGLES_TO_CLOSE && isClosed(this.xyz, this.triangles);
     }
     return this.closed;
   }

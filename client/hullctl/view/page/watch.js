@@ -3,8 +3,8 @@ import {runsOf} from 'hulld/panels/time_line.js';
 
 // Time that a moment takes while playing, within limits for the whole.
 const MOMENT_MS = 400;
-const LEAST_MS = 3000;
-const MOST_MS = 30000;
+const MIN_MS = 3000;
+const MAX_MS = 30000;
 
 const COLLIDING = ['RELATION_TOUCHING', 'RELATION_OVERLAPPING'];
 
@@ -69,7 +69,7 @@ export class Watch {
     return {
       last,
       steps: 1,
-      length: Math.min(Math.max(MOMENT_MS * last, LEAST_MS), MOST_MS),
+      length: Math.min(Math.max(MOMENT_MS * last, MIN_MS), MAX_MS),
       marks: () => runsOf(this.contacts),
       text: (moment) => `revision ${this.moments[moment].revision}`,
       show: (moment) => this.show(moment),

@@ -100,11 +100,11 @@ class Duplex:
     the end of a call only after all earlier messages are read, and a write to a finished call waits
     for that. Create it in a running loop. For use by one task, except for `cancel` and `send`."""
 
-    def __init__(self, call: Any, metadata: Any, most_waiting: int | None = None) -> None:
+    def __init__(self, call: Any, metadata: Any, max_waiting: int | None = None) -> None:
         check_process()
         self._call = call(metadata=metadata)
         self._incoming: asyncio.Queue[Any] = asyncio.Queue()
-        self._room = asyncio.Semaphore(most_waiting) if most_waiting else None
+        self._room = asyncio.Semaphore(max_waiting) if max_waiting else None
         self._end: HulldError | None = None
         self._ended = False
         self._reader = asyncio.get_running_loop().create_task(self._read())

@@ -270,7 +270,7 @@ class ColumnReader:
             column: npt.NDArray[np.float64] = np.concatenate([np.empty(0), *parts])
             if column.size != self.rows * int(np.prod(shape)):
                 raise ValueError(
-                    f"the column {name} holds {column.size} numbers for {self.rows} answers"
+                    f"the column {name} has {column.size} numbers for {self.rows} answers"
                 )
             shaped: npt.NDArray[np.float64] = column.reshape((self.rows, *shape))
             return shaped
@@ -281,14 +281,14 @@ class ColumnReader:
             )
             if column.size != self.rows:
                 raise ValueError(
-                    f"the column {name} holds {column.size} values for {self.rows} answers"
+                    f"the column {name} has {column.size} values for {self.rows} answers"
                 )
             return column
 
         def messages(wanted: bool, parts: list[T], name: str) -> Sequence[T] | None:
             if wanted and len(parts) != self.rows:
                 raise ValueError(
-                    f"the column {name} holds {len(parts)} entries for {self.rows} answers"
+                    f"the column {name} has {len(parts)} entries for {self.rows} answers"
                 )
             return tuple(parts) if wanted else None
 
@@ -299,7 +299,7 @@ class ColumnReader:
                 return None
             if column.size != 2 * self.rows:
                 raise ValueError(
-                    f"the column pieces holds {column.size} numbers for {self.rows} answers"
+                    f"the column pieces has {column.size} numbers for {self.rows} answers"
                 )
             # sint32: 0, -1, 1, -2 ... travel as 0, 1, 2, 3 ...
             half = (column >> np.uint64(1)).astype(np.int64)

@@ -236,7 +236,7 @@ def pieces(points: PointsLike, if_revision: int | None, chunk_bytes: int) -> Ite
     chunks = list(chunks_of(array, size))
     if if_revision is not None and len(chunks) > 1:
         raise ValueError(
-            f"{len(array)} points make {len(chunks)} chunks, and if_revision holds only for the "
+            f"{len(array)} points make {len(chunks)} chunks, and if_revision applies only to the "
             "first; pass fewer points, or a larger chunk_bytes"
         )
     return iter(chunks)

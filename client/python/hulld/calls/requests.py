@@ -354,7 +354,7 @@ class SceneFilter:
 def _group_numbers(values: npt.ArrayLike, name: str) -> npt.NDArray[Any]:
     array = as_integers(values, name)
     if array.size and not (array.min() >= 0 and array.max() < 2**32):
-        raise ValueError(f"{name} holds numbers outside 0 to 2^32 - 1")
+        raise ValueError(f"{name} has numbers outside 0 to 2^32 - 1")
     return array
 
 

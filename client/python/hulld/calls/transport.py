@@ -91,13 +91,13 @@ class Duplex:
     """A bidirectional streaming call with a bound on each wait. gRPC's own iterators wait without a
     bound, so a thread reads. Not thread-safe, except for `cancel` and `send`."""
 
-    def __init__(self, call: Any, metadata: Any, most_waiting: int | None = None) -> None:
-        """most_waiting: maximum number of messages read ahead of `receive`; beyond it, the server
+    def __init__(self, call: Any, metadata: Any, max_waiting: int | None = None) -> None:
+        """max_waiting: maximum number of messages read ahead of `receive`; beyond it, the server
         waits. None: unbounded, for calls whose requests bound their answers."""
         check_process()
         self._outgoing: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self._incoming: queue.SimpleQueue[Any] = queue.SimpleQueue()
-        self._room = threading.Semaphore(most_waiting) if most_waiting else None
+        self._room = threading.Semaphore(max_waiting) if max_waiting else None
         self._end: HulldError | None = None
         self._ended = False
         self._call = call(iter(self._outgoing.get, _END), metadata=metadata)

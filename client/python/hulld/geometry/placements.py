@@ -27,7 +27,7 @@ from hulld.wire import MessageWriter
 # Fields of PackedPlacements.
 _HULL_IDS, _HULLS, _POSES, _SHAPE_SIZES, _SHAPE_POINTS, _RADII, _END_POSES = range(1, 8)
 #: Maximum number of points of an inline shape.
-_MOST_SHAPE_POINTS = 4096
+_MAX_SHAPE_POINTS = 4096
 
 
 @dataclass(frozen=True)
@@ -75,9 +75,9 @@ def as_shape(points: PointsLike, name: str = "points") -> Points:
     """The points of an inline shape. ValueError: as in as_points, or no points, or more than
     4096."""
     array = as_points(points, name)
-    if not 1 <= len(array) <= _MOST_SHAPE_POINTS:
+    if not 1 <= len(array) <= _MAX_SHAPE_POINTS:
         raise ValueError(
-            f"{name} holds {len(array)} points; a shape takes 1 to {_MOST_SHAPE_POINTS}, so "
+            f"{name} has {len(array)} points; a shape needs 1 to {_MAX_SHAPE_POINTS}, so "
             "register a hull of more"
         )
     return array
@@ -256,7 +256,8 @@ class Placements:
             .doubles(_POSES, self.poses)
         )
         if self.shapes:
-            message.uint32s(_SHAPE_SIZES, np.array([len(shape) for shape in self.shapes], np.uint32))
+            sizes = [len(shape) for shape in self.shapes]
+            message.uint32s(_SHAPE_SIZES, np.array(sizes, np.uint32))
             message.message(_SHAPE_POINTS, point_block(np.concatenate(self.shapes)))
         if self.radii is not None:
             message.doubles(_RADII, self.radii)
@@ -293,7 +294,7 @@ def as_integers(values: npt.ArrayLike, name: str) -> npt.NDArray[Any]:
     if array.size == 0:
         return np.empty(array.shape, np.uint32)
     if array.dtype.kind not in "iu":
-        raise TypeError(f"{name} holds {array.dtype}, not integers")
+        raise TypeError(f"{name} has {array.dtype}, not integers")
     return array
 
 

@@ -77,8 +77,8 @@ def point_block(points: Points) -> MessageWriter:
     )
 
 
-def chunks_of(points: Points, most_bytes: int) -> Iterator[Points]:
-    """`points` in pieces of at most `most_bytes`, with at least one point each."""
-    rows = max(1, most_bytes // (3 * points.dtype.itemsize))
+def chunks_of(points: Points, max_bytes: int) -> Iterator[Points]:
+    """`points` in pieces of at most `max_bytes`, with at least one point each."""
+    rows = max(1, max_bytes // (3 * points.dtype.itemsize))
     for first in range(0, len(points), rows):
         yield points[first : first + rows]

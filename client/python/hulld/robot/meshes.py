@@ -19,7 +19,7 @@ Scale = Sequence[Fraction]
 #: Reads a mesh file, as trimesh.load_mesh does.
 MeshLoader = Callable[[pathlib.Path], PointsLike]
 
-_MOST_CONVEX_VERTICES = 4096
+_MAX_CONVEX_VERTICES = 4096
 _RELATIVE_TOLERANCE = 1e-3
 _TRIANGLES_AT_ONCE = 256
 _BYTES_TO_CLASSIFY = 1024
@@ -69,7 +69,7 @@ class Mesh:
     def is_convex(self) -> bool:
         """True if the mesh is closed, has at most 4096 vertices, and no vertex lies outside the
         plane of a triangle by more than a thousandth of the mesh's diagonal."""
-        if len(self.vertices) > _MOST_CONVEX_VERTICES or not self.is_closed():
+        if len(self.vertices) > _MAX_CONVEX_VERTICES or not self.is_closed():
             return False
         tolerance = _RELATIVE_TOLERANCE * self._diagonal()
         a, b, c = (self.vertices[self.triangles[:, corner]] for corner in range(3))

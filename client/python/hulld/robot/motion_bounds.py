@@ -20,7 +20,7 @@ from hulld.robot.description import Description, Joint, PoseNumbers
 from hulld.robot.kinematics import Columns
 
 #: Motions that turn by more than this in a span, in radians, have no bound.
-MOST_TURN = 2.0
+MAX_TURN = 2.0
 
 _UNIT = sys.float_info.epsilon / 2
 _ROUNDED_UP = 1 + 2.0**-20
@@ -54,7 +54,7 @@ class MotionBound:
     def deviation(self, duration: Any, reach: Any) -> Any:
         """The distance of every point within `reach` of the origin from its place in the motion of
         Placement.end_pose between the computed poses at the ends of a span of this duration.
-        Requires duration * turn <= MOST_TURN."""
+        Requires duration * turn <= MAX_TURN."""
         curved = duration * duration / 8 * (self.bend + reach * self.turn * self.turn / 2)
         rounded = self.rounding + 2 * reach * (self.quaternion_rounding + _NORMALIZATION * _UNIT)
         return _ROUNDED_UP * (curved + rounded) + sys.float_info.min

@@ -22,13 +22,13 @@ from hulld.answers.collisions import Batch, Relation
 from hulld.geometry.placements import Placements
 from hulld.robot.answers import MotionContact
 from hulld.robot.description import NO_MOTION
-from hulld.robot.motion_bounds import MOST_TURN, MotionBound
+from hulld.robot.motion_bounds import MAX_TURN, MotionBound
 
 # The limits of client/hullctl/robot/continuous_check.cc.
-_MOST_SEARCHES = 4096
-_MOST_SPANS = 4096
+_MAX_SEARCHES = 4096
+_MAX_SPANS = 4096
 _SPANS_PER_SEARCH = 8
-_MOST_TURN_OF_SEGMENT = 4096
+_MAX_TURN_OF_SEGMENT = 4096
 _SHORTEST_SPAN = 2.0**-50
 _ROUNDED_UP = 1 + 2.0**-50
 
@@ -54,7 +54,7 @@ class Movers:
     def refuse_far_motions(self) -> None:
         """ValueError: a part turns or moves too far between two waypoints."""
         reach = self.reaches[:, np.newaxis]
-        good = self.bounds.turn <= _MOST_TURN_OF_SEGMENT
+        good = self.bounds.turn <= _MAX_TURN_OF_SEGMENT
         good = good & np.isfinite(self.bounds.deviation(1.0, reach))
         if good.all():
             return
@@ -140,7 +140,7 @@ class MotionSearch:
     def contacts(self, segments: int) -> Iterator[MotionContact]:
         """Yields the ends of all searches that do not prove a pair free, ordered by waypoint."""
         closed: set[int] = set()
-        at_once = max(1, _MOST_SEARCHES // len(self._pairs))
+        at_once = max(1, _MAX_SEARCHES // len(self._pairs))
         for first in range(0, segments, at_once):
             searches = [
                 _Search(segment, pair)
@@ -176,7 +176,7 @@ class MotionSearch:
             # A contact makes the later searches of its pair unnecessary.
             if search.segment > met.get(search.pair, search.segment):
                 search.is_done = True
-            if not search.is_done and len(asked) < _MOST_SPANS:
+            if not search.is_done and len(asked) < _MAX_SPANS:
                 asked += [(search, span) for span in search.open[:_SPANS_PER_SEARCH]]
         segments = np.array([search.segment for search, _ in asked], np.intp)
         objects = self._pairs[[search.pair for search, _ in asked]]
@@ -184,7 +184,7 @@ class MotionSearch:
         durations = np.array([span.duration for _, span in asked])
         moves, bounds, reaches = self._moving(segments, objects)
         span = durations[:, np.newaxis]
-        can_ask = (~moves | (span * bounds.turn <= MOST_TURN)).all(axis=1)
+        can_ask = (~moves | (span * bounds.turn <= MAX_TURN)).all(axis=1)
         travel = np.where(moves, bounds.travel(span, reaches), 0).sum(axis=1)
         is_last = can_ask & ((travel <= self._resolution / 2) | (durations <= _SHORTEST_SPAN))
         until = np.zeros(len(asked))

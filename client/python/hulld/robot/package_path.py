@@ -8,7 +8,7 @@ import urllib.parse
 from collections.abc import Iterator, Mapping
 
 _PACKAGE_DEPTH = 3
-_MOST_FOLDERS = 10_000
+_MAX_FOLDERS = 10_000
 
 
 def resolve_file(
@@ -41,7 +41,7 @@ def resolve_file(
     named = [*tried][:8]
     more = f" and {len(tried) - len(named)} more" if len(tried) > len(named) else ""
     raise FileNotFoundError(
-        f"no folder of the package {package!r} holds {file}; set its folder with "
+        f"no folder of the package {package!r} contains {file}; set its folder with "
         f"packages={{{package!r}: DIR}} (looked in {', '.join(named)}{more})"
     )
 
@@ -89,7 +89,7 @@ def _packages_below(folder: pathlib.Path, package: str) -> Iterator[pathlib.Path
             except OSError:
                 continue
         seen += len(below)
-        if seen > _MOST_FOLDERS:
+        if seen > _MAX_FOLDERS:
             return
         level = sorted(below)
         yield from (entry for entry in level if entry.name == package)

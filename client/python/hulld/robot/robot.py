@@ -325,7 +325,7 @@ class Robot:
         """
         values = self._configurations(q)
         if len(values) < 2:
-            raise ValueError(f"q holds {len(values)} waypoints; a motion needs at least 2")
+            raise ValueError(f"q has {len(values)} waypoints; a motion needs at least 2")
         clearance = arguments.number(clearance, "clearance", least=0)
         resolution = arguments.number(resolution, "resolution", least=0)
         self._warn_of_limits(values)

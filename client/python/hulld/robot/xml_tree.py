@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from xml.parsers import expat
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
-_MOST_DEPTH = 100
+_MAX_DEPTH = 100
 
 
 @dataclass
@@ -78,8 +78,8 @@ def read_xml(path: str | os.PathLike[str], root: str) -> Element:
         element = Element(source, tag, attributes, parser.CurrentLineNumber)
         if tag.startswith("xacro:"):
             raise element.error(f"<{tag}> is a macro; expand the file with 'xacro' first")
-        if len(open_elements) > _MOST_DEPTH:
-            raise element.error(f"elements are nested deeper than {_MOST_DEPTH}")
+        if len(open_elements) > _MAX_DEPTH:
+            raise element.error(f"elements are nested deeper than {_MAX_DEPTH}")
         open_elements[-1].children.append(element)
         open_elements.append(element)
 

@@ -129,7 +129,7 @@ TEST(SceneFile, GroupsAndMoversLeaveOutPairs) {
   const auto few = Read(placements + R"("groups":[0]})");
   ASSERT_TRUE(few.ok());
   EXPECT_THAT(std::string(PairsOf(*few, "FILE").status().message()),
-              HasSubstr("groups holds 1 groups for 4 placements"));
+              HasSubstr("groups has 1 groups for 4 placements"));
   const auto none = Read(placements + R"("movers":0})");
   ASSERT_TRUE(none.ok());
   EXPECT_THAT(std::string(PairsOf(*none, "FILE").status().message()), HasSubstr("no pairs"));
@@ -155,7 +155,7 @@ TEST(SceneFile, JsonThatIsNotASceneIsExplained) {
       "poses":[1,0,0,0, 0,0,0]}})"),
               HasSubstr("names hull 1"));
   EXPECT_THAT(Error(R"({"packedPlacements":{"hullIds":["a"],"hulls":[0],"poses":[1]}})"),
-              HasSubstr("holds 1 numbers for 1 placements"));
+              HasSubstr("has 1 numbers for 1 placements"));
   EXPECT_THAT(Error(""), HasSubstr("FILE contains no scene"));
 }
 

@@ -188,7 +188,7 @@ def test_packages_are_searched_in_order(
     assert resolve_file(name, urdf, {}) == ros
     assert resolve_file(name, urdf, {"arm": tmp_path / "elsewhere"}) == named
     with pytest.raises(
-        FileNotFoundError, match=r"package 'arm' holds b.stl; .*'arm': DIR.*elsewhere"
+        FileNotFoundError, match=r"package 'arm' contains b.stl; .*'arm': DIR.*elsewhere"
     ):
         resolve_file("package://arm/b.stl", urdf, {"arm": tmp_path / "elsewhere"})
     for bad in ("package://arm", "package:///a.stl", "http://a/b.stl"):

@@ -14,7 +14,7 @@ import pytest
 
 import hulld
 from hulld.robot.kinematics import joint_values, link_poses
-from hulld.robot.motion_bounds import MOST_TURN, align_turns, bound_motions
+from hulld.robot.motion_bounds import MAX_TURN, align_turns, bound_motions
 from hulld.robot.urdf import read_urdf
 from test_robot_checks import ALL_KINDS, ALL_SRDF
 from test_robot_meshes import TRIANGLES, binary_stl, box_obj
@@ -213,7 +213,7 @@ def test_bounds_hold_for_sampled_motions(
                 linear = (1 - t) * unit(first[link]) + t * unit(last[link])
                 apart = np.linalg.norm(moved(now[link], point) - moved(linear, point), axis=0)
                 most = np.broadcast_to(bound.deviation(duration, 1.3), apart.shape)
-                counts = np.broadcast_to(bound.turn * duration <= MOST_TURN, apart.shape)
+                counts = np.broadcast_to(bound.turn * duration <= MAX_TURN, apart.shape)
                 assert (apart <= most)[counts].all()
                 way = np.linalg.norm(moved(now[link], point) - moved(first[link], point), axis=0)
                 assert (way <= bound.travel(duration, 1.3) + 1e-13).all()

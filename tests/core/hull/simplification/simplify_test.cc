@@ -66,7 +66,7 @@ double Support(const Hull& hull, const Vector& n) {
 
 // The Hausdorff distance of nested convex sets is the largest difference of their support
 // functions; sampling some directions gives a lower bound.
-double LeastHausdorffDistance(const Hull& inner, const Hull& outer) {
+double MinHausdorffDistance(const Hull& inner, const Hull& outer) {
   double most = 0;
   for (const Vector& n : Sphere(3000, 99)) {
     most = std::max(most, Support(outer, n) - Support(inner, n));
@@ -90,7 +90,7 @@ TEST_P(Simplify, InsideIsASubsetWithinItsProvenError) {
     EXPECT_EQ(inside->hull.vertices().size(), GetParam());
     EXPECT_TRUE(AuditHull(inside->hull).ok());
     EXPECT_TRUE(IsSubset(inside->hull, full));
-    const double least = LeastHausdorffDistance(inside->hull, full);
+    const double least = MinHausdorffDistance(inside->hull, full);
     EXPECT_GE(inside->error, least * (1 - 1e-12));
     // Sampled directions are weak for slender shapes.
     if (radii.minCoeff() > 0.1) {
@@ -107,7 +107,7 @@ TEST_P(Simplify, OutsideEnclosesExactlyWithinItsProvenError) {
     EXPECT_LE(outside->hull.vertices().size(), GetParam());
     EXPECT_TRUE(AuditHull(outside->hull).ok());
     EXPECT_TRUE(AuditContainment(outside->hull, full.vertices()).ok());
-    const double least = LeastHausdorffDistance(full, outside->hull);
+    const double least = MinHausdorffDistance(full, outside->hull);
     EXPECT_GE(outside->error, least * (1 - 1e-12));
     if (radii.minCoeff() > 0.1) {
       EXPECT_LE(outside->error, 3 * least);
@@ -213,12 +213,12 @@ TEST(SimplifyFlat, HullsOfEveryDimensionAreHandled) {
   const auto inside = SimplifyInside(polygon, {10, 0, {}});
   ASSERT_TRUE(inside.ok());
   EXPECT_EQ(inside->hull.vertices().size(), 10u);
-  EXPECT_GE(inside->error, LeastHausdorffDistance(inside->hull, polygon) * (1 - 1e-12));
+  EXPECT_GE(inside->error, MinHausdorffDistance(inside->hull, polygon) * (1 - 1e-12));
   EXPECT_LT(inside->error, 0.2);
   const auto outside = SimplifyOutside(polygon, {10, 0, {}});
   ASSERT_TRUE(outside.ok());
   EXPECT_TRUE(AuditContainment(outside->hull, polygon.vertices()).ok());
-  EXPECT_GE(outside->error, LeastHausdorffDistance(polygon, outside->hull) * (1 - 1e-12));
+  EXPECT_GE(outside->error, MinHausdorffDistance(polygon, outside->hull) * (1 - 1e-12));
   for (const std::vector<Vector>& few :
        {std::vector<Vector>{}, {Vector(1, 2, 3)}, {Vector(1, 2, 3), Vector(4, 5, 6)}}) {
     const Hull hull = HullOf(few);
@@ -481,14 +481,14 @@ TEST(SimplifyQuality, SmallHullsNeedFewMoreVerticesThanTheBestSubset) {
   for (const unsigned seed : {1u, 2u, 3u}) {
     const Hull full = HullOf(Sphere(kVertices, seed, Vector(1, 0.7, 0.4)));
     ASSERT_EQ(full.vertices().size(), static_cast<size_t>(kVertices));
-    std::vector<double> least_error(kVertices, INFINITY);
+    std::vector<double> min_error(kVertices, INFINITY);
     for (unsigned chosen = 0; chosen < 1u << kVertices; ++chosen) {
       const int count = std::popcount(chosen);
       if (count < 4 || count == kVertices) continue;
-      least_error[count] = std::min(least_error[count], ErrorOfSubset(full, chosen));
+      min_error[count] = std::min(min_error[count], ErrorOfSubset(full, chosen));
     }
     for (int count = 4; count < kVertices; ++count) {
-      const auto simple = SimplifyInside(full, {0, least_error[count] * 1.000001, {}});
+      const auto simple = SimplifyInside(full, {0, min_error[count] * 1.000001, {}});
       ASSERT_TRUE(simple.ok()) << simple.status();
       EXPECT_LE(simple->hull.vertices().size(), 1.8 * count);
       needed += static_cast<double>(simple->hull.vertices().size());

@@ -154,11 +154,11 @@ TEST(DirectionMap, KeepsUnmeasurableDirections) {
                                    Vector(0, 0, 1e302), Vector(1, 1, 1)};
   EXPECT_EQ(SurvivorCount(map, far), far.size());
   // In a frame, an infinite difference times zero, or minus another, is NaN.
-  constexpr double kMost = std::numeric_limits<double>::max();
+  constexpr double kMax = std::numeric_limits<double>::max();
   std::vector<Vector> overflowing;
-  for (const double x : {-kMost, 0.0, kMost}) {
-    for (const double y : {-kMost, 0.0, kMost}) {
-      for (const double z : {-kMost, kMost}) overflowing.emplace_back(x, y, z);
+  for (const double x : {-kMax, 0.0, kMax}) {
+    for (const double y : {-kMax, 0.0, kMax}) {
+      for (const double z : {-kMax, kMax}) overflowing.emplace_back(x, y, z);
     }
   }
   for (const Vector& center : {Vector(0, 0, 0), Vector(1e305, -1e305, 1e305)}) {

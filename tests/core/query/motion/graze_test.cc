@@ -131,7 +131,7 @@ constexpr double kScales[] = {1, 3e-18};
 constexpr int kDigitStep = 2;
 #endif
 // Exact arithmetic polls several times per step.
-constexpr int kMostPolls = 2500;
+constexpr int kMaxPolls = 2500;
 
 TEST(Graze, StepsGrowWithTheLogarithmOfTheGap) {
   for (const Passage& passage : Passages()) {
@@ -167,7 +167,7 @@ TEST(Graze, ShallowContactsAreFound) {
         if (digits <= 8) {
           EXPECT_EQ(exact.contact.relation, Relation::kOverlapping);
         }
-        EXPECT_LE(exact.polls, kMostPolls);
+        EXPECT_LE(exact.polls, kMaxPolls);
       }
     }
   }
@@ -215,7 +215,7 @@ TEST(Graze, ContactAfterAGrazeIsFound) {
     const Answered met =
         Find(Moving({tips, turn}, 1, 0), Moving({Shifted(Box(0.5, 2, 2), {1.5, 0, 0})}, 1, gap));
     EXPECT_EQ(met.contact.relation, Relation::kOverlapping);
-    EXPECT_LE(met.polls, kMostPolls);
+    EXPECT_LE(met.polls, kMaxPolls);
   }
 }
 

@@ -20,7 +20,7 @@ namespace vanishing_test {
 using oracle::Rational;
 
 // Maximum number of polls in a search that terminates (Graze.ShallowContactsAreFound).
-constexpr int kMostPolls = 2500;
+constexpr int kMaxPolls = 2500;
 
 using Quaternion = std::array<double, 4>;
 
@@ -92,7 +92,7 @@ absl::StatusOr<FirstContact> Find(const OwnMoving& a, const OwnMoving& b, Motion
     return false;
   };
   absl::StatusOr<FirstContact> contact = FindFirstContact(a.moving(), b.moving(), options);
-  EXPECT_LE(polls, kMostPolls);
+  EXPECT_LE(polls, kMaxPolls);
   return contact;
 }
 
@@ -120,7 +120,7 @@ testing::AssertionResult IsRight(const OwnMoving& a, const OwnMoving& b,
     translations +=
         std::max(motion.start.t.cwiseAbs().maxCoeff(), motion.end.t.cwiseAbs().maxCoeff());
   }
-  double resolution = 2 * kLeastRelativeResolution * (sizes + translations);
+  double resolution = 2 * kMinRelativeResolution * (sizes + translations);
   if (!contact.contact_time) {
     resolution =
         std::max(resolution, options.resolution.value_or(kDefaultRelativeResolution * sizes));

@@ -133,7 +133,7 @@ bool HistoryClient::End(const std::string& hull_id, Operation& operation,
 }
 
 void HistoryClient::ChooseFreshness(Operation& operation, v1::Freshness& freshness) {
-  constexpr int kMostMilliseconds = 50;
+  constexpr int kMaxMilliseconds = 50;
   if (!any_freshness_) return;
   const bool is_at_least = Below(2) == 0 && last_header_.revision() > 0;
   const bool is_bounded = Below(2) == 0;
@@ -143,7 +143,7 @@ void HistoryClient::ChooseFreshness(Operation& operation, v1::Freshness& freshne
     operation.at_least_revision = last_header_.revision();
   }
   if (is_bounded) {
-    const int nanos = 1'000'000 * (1 + Below(kMostMilliseconds));
+    const int nanos = 1'000'000 * (1 + Below(kMaxMilliseconds));
     freshness.mutable_max_staleness()->set_nanos(nanos);
     operation.max_staleness = nanos;
   } else if (is_at_least) {

@@ -19,7 +19,7 @@ using Kind = Operation::Kind;
 
 constexpr int kProbes = 4;
 // More pages than any list of a history's hulls has.
-constexpr int kMostPages = 20;
+constexpr int kMaxPages = 20;
 
 const double* PointAt(int point) { return HistoryCloud().data() + 3 * point; }
 
@@ -299,7 +299,7 @@ bool HistoryClient::List(
   const int page_size = Below(2);
   std::string token;
   std::string after;
-  for (int pages = 0; pages < kMostPages; ++pages) {
+  for (int pages = 0; pages < kMaxPages; ++pages) {
     Operation operation = Begin(Kind::kBatch);
     operation.max_staleness = chosen.max_staleness;
     const Page page = ask(freshness, page_size, token);

@@ -29,7 +29,7 @@ constexpr char kAdminPassword[] = "Wort-des-Verwalters-3c";
 // Several times the size of all clusters of a few concurrent tests, so that they do not fill it.
 constexpr uintmax_t kSpaceInMemory = uintmax_t{2} << 30;
 // Far more attempts than a standby needs to catch up.
-constexpr int kMostAttempts = 10'000;
+constexpr int kMaxAttempts = 10'000;
 
 [[noreturn]] void Fail(const std::string& what) {
   std::fprintf(stderr, "PostgresCluster: %s\n", what.c_str());
@@ -193,7 +193,7 @@ void PostgresCluster::Follow(PostgresCluster& primary) {
   primary.Ask("postgres", "SELECT pg_reload_conf()");
   const std::string is_followed = "SELECT 1 FROM pg_stat_replication WHERE sync_state = 'sync'";
   for (int attempt = 0; primary.Ask("postgres", is_followed).empty(); ++attempt) {
-    if (attempt == kMostAttempts) Fail(Contents(directory_ + "/server.log"));
+    if (attempt == kMaxAttempts) Fail(Contents(directory_ + "/server.log"));
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
 }

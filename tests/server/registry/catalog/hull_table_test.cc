@@ -200,7 +200,7 @@ TEST_F(HullTableTest, ManyIdleHullsComeToRestOverSeveralHolds) {
   for (int i = 0; i < kHulls; ++i) Cube("h" + std::to_string(i));
   PassTime();
   for (int i = 0; i < kHulls; ++i) EXPECT_FALSE(IsAwake("h" + std::to_string(i))) << i;
-  EXPECT_LE(mutex_.Statistics().most_lookups, kMostLookupsPerHold);
+  EXPECT_LE(mutex_.Statistics().max_lookups, kMaxLookupsPerHold);
 }
 
 TEST_F(HullTableTest, AHullThatWasInUseForLongRestsAfterwards) {
@@ -301,8 +301,8 @@ TEST_F(HullTableTest, AChangedHullRestsAfterManyLaterOnesUnlessItIsLookedUp) {
   change("first");
   change("asked");
   EXPECT_NE(table_.Find("asked"), nullptr);
-  for (size_t i = 0; i < HullTable::kMostJustChanged; ++i) {
-    EXPECT_TRUE(IsAwake("first") || i + 2 >= HullTable::kMostJustChanged) << i;
+  for (size_t i = 0; i < HullTable::kMaxJustChanged; ++i) {
+    EXPECT_TRUE(IsAwake("first") || i + 2 >= HullTable::kMaxJustChanged) << i;
     change("later/" + std::to_string(i));
   }
   EXPECT_FALSE(IsAwake("first"));

@@ -55,8 +55,8 @@ class SupersededHull : public ::testing::Test {
 
 TEST_F(SupersededHull, OnlyFewPointsInDeltasAfterTheSameBaseAreGrowth) {
   EXPECT_TRUE(hull_.GrewInto(Grown()));
-  EXPECT_TRUE(hull_.GrewInto(Grown(RegisteredHull::kMostGrowth)));
-  EXPECT_FALSE(hull_.GrewInto(Grown(RegisteredHull::kMostGrowth + 1)));
+  EXPECT_TRUE(hull_.GrewInto(Grown(RegisteredHull::kMaxGrowth)));
+  EXPECT_FALSE(hull_.GrewInto(Grown(RegisteredHull::kMaxGrowth + 1)));
   const auto grew_with = [&](const std::function<void(StoredHull&)>& change) {
     StoredHull stored = Grown();
     change(stored);
@@ -111,7 +111,7 @@ TEST_F(SupersededHull, ABuilderIsKeptUnlessItLacksMuch) {
   hull_.SetBuilder(std::make_unique<HullBuilder>());
   EXPECT_TRUE(Supersede(Grown(), &growth_));
   EXPECT_THAT(hull_.builder_backlog(), ElementsAre(growth_.front()));
-  const std::vector<Vector> many = SpherePoints(RegisteredHull::kMostGrowth, 10);
+  const std::vector<Vector> many = SpherePoints(RegisteredHull::kMaxGrowth, 10);
   StoredHull next = Grown(1 + many.size());
   next.record.revision = 10;
   EXPECT_TRUE(Supersede(next, &many));

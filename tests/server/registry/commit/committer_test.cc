@@ -230,7 +230,7 @@ TEST_F(CommitterTest, ManyCompletionsYieldExceptBetweenRefusals) {
         while (!order_.is_wanted()) std::this_thread::yield();
       });
     }
-    constexpr uint64_t kMany = 3 * Committer::kMostPerHold;
+    constexpr uint64_t kMany = 3 * Committer::kMaxPerHold;
     for (uint64_t revision = 3; revision < kMany; ++revision) Submit(revision);
     std::future<void> last = Submit(kMany);
     // A refusal ends all of them together; otherwise the first is a separate batch.
@@ -238,7 +238,7 @@ TEST_F(CommitterTest, ManyCompletionsYieldExceptBetweenRefusals) {
     last.wait();
     passer.join();
     if (outcome.ok()) {
-      EXPECT_LE(completed_by_then, Committer::kMostPerHold);
+      EXPECT_LE(completed_by_then, Committer::kMaxPerHold);
     } else {
       EXPECT_EQ(completed_by_then, kMany - 1);
     }
@@ -444,8 +444,8 @@ TEST(Committer, AReadBarrierIsSentByItsCallerAndNotSharedWithLaterOnes) {
     });
   };
   // The committer's thread may not be waiting yet: then it sends the request itself.
-  constexpr int kMostTries = 100'000;
-  for (int i = 0; i < kMostTries && store.starts == 0; ++i) {
+  constexpr int kMaxTries = 100'000;
+  for (int i = 0; i < kMaxTries && store.starts == 0; ++i) {
     std::promise<void> told;
     {
       Locked locked(order);

@@ -114,7 +114,7 @@ TEST_F(MemoryBudgetTest, OneEvictionAsksABoundedNumber) {
   }
   const MemoryCharge charge(budget_, MemoryUse::kWriting, 50);
   Evict();
-  EXPECT_EQ(asked_.size(), MemoryBudget::kMostVisited);
+  EXPECT_EQ(asked_.size(), MemoryBudget::kMaxVisited);
   EXPECT_EQ(bytes(), 250);
   for (int i = 0; i < 3; ++i) Evict();
   EXPECT_EQ(bytes(), 200);

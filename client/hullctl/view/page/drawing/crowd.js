@@ -7,7 +7,7 @@ import {RELATIONS} from 'hulld/palette.js';
 import {rotate, unitQuaternion} from 'hulld/pose.js';
 
 // With more edges, lines would hide the surface.
-const MOST_EDGES = 400000;
+const MAX_EDGES = 400000;
 
 export class Crowd extends DrawnGroup {
   clear() {
@@ -24,7 +24,7 @@ export class Crowd extends DrawnGroup {
         (object) => !except.has(object.index) && model.isShown(object) && model.hullOf(object));
     const total = (count) => members.reduce((sum, o) => sum + count(model.hullOf(o)), 0);
     const edgeTotal = total((hull) => hull.edges.length);
-    const withEdges = model.show.edges && edgeTotal / 2 <= MOST_EDGES;
+    const withEdges = model.show.edges && edgeTotal / 2 <= MAX_EDGES;
     const vertices = total((hull) => hull.vertexCount);
     this.positions = new THREE.BufferAttribute(new Float32Array(3 * vertices), 3);
     this.fills = new THREE.BufferAttribute(new Uint8Array(3 * vertices), 3, true);

@@ -7,7 +7,7 @@ import {element, short} from 'hulld/panels/dom.js';
 // Extent of the grid, in radii of the scene, and pieces of a line, for fading toward its ends.
 const REACH = 3.2;
 const PIECES = 16;
-const MOST_BAR_PIXELS = 110;
+const MAX_BAR_PIXELS = 110;
 
 // Returns the largest of 1, 2, and 5 times a power of ten that is at most `length`.
 function roundBelow(length) {
@@ -71,7 +71,7 @@ export class Ground extends DrawnGroup {
 
   updateBar() {
     const perPixel = this.stage.lengthPerPixel();
-    const length = roundBelow(MOST_BAR_PIXELS * perPixel);
+    const length = roundBelow(MAX_BAR_PIXELS * perPixel);
     if (!(length > 0) || !isFinite(length)) return;
     this.bar.style.width = `${(length / perPixel).toFixed(1)}px`;
     const unit = length === 1 ? 'unit' : 'units';

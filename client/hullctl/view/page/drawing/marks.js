@@ -5,7 +5,7 @@ import {discTexture, gridTexture, THREE} from 'hulld/drawing/three.js';
 import {MARK_COLORS} from 'hulld/palette.js';
 
 // With more edges, lines would hide the surface.
-const MOST_PIECE_EDGES = 20000;
+const MAX_PIECE_EDGES = 20000;
 
 // Cells of the plane's grid per radius of the smaller object.
 const PLANE_CELLS = 4;
@@ -91,7 +91,7 @@ export class Marks extends DrawnGroup {
   addPieces(objects) {
     this.model.decidingPieces().forEach((piece, k) => {
       const hull = piece && this.model.hulls.get(piece.hullId);
-      if (!hull || hull.edges.length > 2 * MOST_PIECE_EDGES) return;
+      if (!hull || hull.edges.length > 2 * MAX_PIECE_EDGES) return;
       const vertices = Array.from(
           {length: hull.vertexCount},
           (_, i) => this.local(

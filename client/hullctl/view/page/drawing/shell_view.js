@@ -6,7 +6,7 @@ import {MARK_COLORS} from 'hulld/palette.js';
 import {unitQuaternion} from 'hulld/pose.js';
 
 // Shells of larger hulls have as many facets as the hull.
-const MOST_FACETS = 20000;
+const MAX_FACETS = 20000;
 
 export class ShellView extends DrawnGroup {
   // Object whose hull is simplified.
@@ -63,7 +63,7 @@ export class ShellView extends DrawnGroup {
 
   addShell(hull, distance) {
     if (!(distance > 0)) return;
-    const make = hull.facetCount > MOST_FACETS ? fineShell : shellGeometry;
+    const make = hull.facetCount > MAX_FACETS ? fineShell : shellGeometry;
     this.add(make(hull, distance), hull.center, {color: MARK_COLORS.shell, opacity: 0.2});
   }
 

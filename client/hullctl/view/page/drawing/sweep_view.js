@@ -11,23 +11,23 @@ import {RELATIONS} from 'hulld/palette.js';
 import {angleBetween, poseAt, toWorld, unitQuaternion} from 'hulld/pose.js';
 
 // Largest rotation between two samples, in radians, and the greatest number of halvings.
-const MOST_ANGLE = Math.PI / 16;
-const MOST_HALVINGS = 6;
+const MAX_ANGLE = Math.PI / 16;
+const MAX_HALVINGS = 6;
 // Larger shapes are represented by their extreme vertices.
-const MOST_VERTICES = 160;
+const MAX_VERTICES = 160;
 // Bodies of more pieces are swept as one hull.
-const MOST_PIECES = 12;
+const MAX_PIECES = 12;
 // More moving objects are drawn without swept shapes.
-const MOST_SWEEPS = 24;
+const MAX_SWEEPS = 24;
 // With more edges, outlines would hide the surface.
-const MOST_EDGES = 20000;
+const MAX_EDGES = 20000;
 
 // Returns sampled poses of a motion, at least both ends.
 function sampledPoses({start, endPose}) {
   const poses = [start];
   const sample = (t, until, halvings) => {
     const [from, to] = [t, until].map((time) => poseAt(start, endPose, time));
-    if (halvings === 0 || angleBetween(from, to) <= MOST_ANGLE) {
+    if (halvings === 0 || angleBetween(from, to) <= MAX_ANGLE) {
       poses.push(to);
       return;
     }
@@ -35,8 +35,8 @@ function sampledPoses({start, endPose}) {
     sample((t + until) / 2, until, halvings - 1);
   };
   // Halves first, because the angle between both ends does not reveal a longer way around.
-  sample(0, 0.5, MOST_HALVINGS);
-  sample(0.5, 1, MOST_HALVINGS);
+  sample(0, 0.5, MAX_HALVINGS);
+  sample(0.5, 1, MAX_HALVINGS);
   return angleBetween(start, endPose) === 0 && poses.length === 3 ? [start, endPose] : poses;
 }
 
@@ -67,7 +67,7 @@ export class SweepView extends DrawnGroup {
     this.clear();
     const {model} = this;
     const {moving} = model;
-    if (model.show.sweep && moving.length <= MOST_SWEEPS) {
+    if (model.show.sweep && moving.length <= MAX_SWEEPS) {
       for (const object of moving) this.addSweep(object);
     }
     if (model.show.sweep) this.addContact();
@@ -78,9 +78,9 @@ export class SweepView extends DrawnGroup {
   partsOf(object, shape) {
     const rounded = this.model.roundedOf(object);
     const parts = rounded?.parts ?? this.model.partsOf(object);
-    if (parts.length > MOST_PIECES) return [fewVertices(rounded ?? shape, MOST_VERTICES)];
+    if (parts.length > MAX_PIECES) return [fewVertices(rounded ?? shape, MAX_VERTICES)];
     return parts.map(
-        ({hull, pose}) => fewVertices(hull, MOST_VERTICES).map((p) => toWorld(pose, p)));
+        ({hull, pose}) => fewVertices(hull, MAX_VERTICES).map((p) => toWorld(pose, p)));
   }
 
   geometryOf(object, shape) {
@@ -133,7 +133,7 @@ export class SweepView extends DrawnGroup {
     const {lit} = RELATIONS[model.pairMotion.relation];
     for (const object of model.pair.map((index) => model.objects[index])) {
       const hull = model.hullOf(object);
-      if (!object.endPose || !hull || !model.isShown(object) || hull.edges.length > 2 * MOST_EDGES)
+      if (!object.endPose || !hull || !model.isShown(object) || hull.edges.length > 2 * MAX_EDGES)
         continue;
       const pose = poseAt(object.start, object.endPose, contact.contactTime);
       const material = new THREE.LineBasicMaterial({

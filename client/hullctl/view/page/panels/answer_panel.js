@@ -5,8 +5,8 @@ import {ProofLine} from 'hulld/panels/proof_line.js';
 import {poseText} from 'hulld/pose.js';
 import {certificateProblem} from 'hulld/proof/certificate.js';
 
-const MOST_ROWS = 200;
-const MOST_CHOICES = 400;
+const MAX_ROWS = 200;
+const MAX_CHOICES = 400;
 const MARK_NAMES = {
   plane: 'plane',
   axis: 'axis',
@@ -55,8 +55,8 @@ export class AnswerPanel {
     const {model} = this;
     const {pair} = model;
     const select = element('select', {'aria-label': `Object ${letter}`, id: `object-${letter}`});
-    const near = model.objects.slice(0, MOST_CHOICES);
-    if (pair[place] >= MOST_CHOICES) near.push(model.objects[pair[place]]);
+    const near = model.objects.slice(0, MAX_CHOICES);
+    if (pair[place] >= MAX_CHOICES) near.push(model.objects[pair[place]]);
     for (const object of near) {
       if (!object.hullId || object.index === pair[1 - place]) continue;
       select.append(element(
@@ -227,7 +227,7 @@ export class AnswerPanel {
     const title = count === 0 ? 'No pair collides' :
         count === 1           ? '1 pair collides' :
                                 `${grouped(count)} pairs collide`;
-    const rows = pairs.slice(0, MOST_ROWS).map(([a, b, relation]) => {
+    const rows = pairs.slice(0, MAX_ROWS).map(([a, b, relation]) => {
       const {word, sign, style} = RELATIONS[relation];
       return element(
           'li', {},

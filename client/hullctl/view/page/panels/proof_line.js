@@ -2,7 +2,7 @@
 import {element, grouped} from 'hulld/panels/dom.js';
 
 // Checks of more steps than this run on demand: a million take seconds.
-const MOST_STEPS = 20000;
+const MAX_STEPS = 20000;
 
 export class ProofLine {
   constructor(id) {
@@ -31,7 +31,7 @@ export class ProofLine {
       line.textContent =
           problem ? `\u2717 Certificate refuted here: ${problem}` : `\u2713 ${proven}`;
     };
-    if (steps <= MOST_STEPS) {
+    if (steps <= MAX_STEPS) {
       run();
     } else {
       const text = `Check the certificate here (${grouped(steps)} steps)`;

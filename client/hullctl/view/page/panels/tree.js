@@ -4,12 +4,12 @@ import {RELATIONS} from 'hulld/palette.js';
 import {element, grouped} from 'hulld/panels/dom.js';
 
 // More rows would slow down the page; the search finds the rest.
-const MOST_ROWS = 400;
+const MAX_ROWS = 400;
 
 // Number of pieces up to which a body is expanded by default, and the maximum number of listed
 // pieces.
-const MOST_OPEN_PIECES = 8;
-const MOST_PIECE_ROWS = 100;
+const MAX_OPEN_PIECES = 8;
+const MAX_PIECE_ROWS = 100;
 
 const INDENT = 12;
 
@@ -84,7 +84,7 @@ export class Tree {
       rows.push(row);
     };
     for (const group of groups) {
-      if (rows.length >= MOST_ROWS) {
+      if (rows.length >= MAX_ROWS) {
         left += group.objects.length;
         continue;
       }
@@ -92,7 +92,7 @@ export class Tree {
       if (!this.closed.has(group.prefix)) left += this.addRows(group, depth + 1, rows);
     }
     for (const object of members) {
-      if (rows.length >= MOST_ROWS) {
+      if (rows.length >= MAX_ROWS) {
         ++left;
         continue;
       }
@@ -128,7 +128,7 @@ export class Tree {
 
   isOpen({index, hullId}) {
     const body = this.model.bodies.get(hullId);
-    const isShort = body?.pieces.length <= MOST_OPEN_PIECES && !this.model.isCrowd;
+    const isShort = body?.pieces.length <= MAX_OPEN_PIECES && !this.model.isCrowd;
     return Boolean(body) && isShort !== this.turned.has(index);
   }
 
@@ -156,7 +156,7 @@ export class Tree {
     const {pieces} = model.bodies.get(object.hullId);
     const place = model.pair?.indexOf(object.index) ?? -1;
     const decider = place < 0 ? null : model.decidingPieces()[place];
-    const rows = pieces.slice(0, MOST_PIECE_ROWS).map((piece, i) => {
+    const rows = pieces.slice(0, MAX_PIECE_ROWS).map((piece, i) => {
       const isAbsent = model.absent.has(piece.hullId);
       return element(
           'div', {className: `row piece ${isAbsent ? 'gone' : ''}`},

@@ -5,11 +5,11 @@ import {combination, commonExponent, cross, difference, dot, isZero, product, ro
 
 // Limits of the contract: Caratheodory's number for a point of the hull, and Steinitz's for an
 // interior point.
-export const MOST_PAIRS = {
+export const MAX_PAIRS = {
   RELATION_TOUCHING: 4,
   RELATION_OVERLAPPING: 6
 };
-const MOST_DIGITS = 100000;
+const MAX_DIGITS = 100000;
 
 class ProofFails extends Error {}
 
@@ -100,7 +100,7 @@ export function checkPlacement({xyz, poses, radii = []}) {
 
 function readInteger(text) {
   require(
-      text.length <= MOST_DIGITS && /^-?[0-9]+$/.test(text),
+      text.length <= MAX_DIGITS && /^-?[0-9]+$/.test(text),
       'integer_direction is not a decimal integer');
   return BigInt(text);
 }
@@ -222,7 +222,7 @@ function checkRounded(relation, certificate, a, b) {
         'the gap between the hulls along the direction is too small for their radii');
     if (isSeparated) return;
   }
-  const points = differences(MOST_PAIRS[relation], certificate, a, b);
+  const points = differences(MAX_PAIRS[relation], certificate, a, b);
   require(
       comesWithin(points, radiiOf(a, b) ** 2n, relation === 'RELATION_OVERLAPPING'),
       'the hull of the differences of the vertex pairs is too far from 0 for the radii');
@@ -240,7 +240,7 @@ export function checkExactly(relation, certificate, a, b) {
         'the direction does not separate: max n.A >= min n.B');
     return;
   }
-  const points = differences(MOST_PAIRS[relation], certificate, a, b);
+  const points = differences(MAX_PAIRS[relation], certificate, a, b);
   if (relation === 'RELATION_OVERLAPPING') {
     require(
         holdsOriginInside(points),

@@ -1,6 +1,6 @@
 // Checks the certificate of a motion by exact arithmetic, as certificate.js does for a pair at
 // rest. The C++ client has the same check in client/verify/motion_check.h.
-import {areFinite, checkExactly, checkPlacement, checkRelation, differences, gapSign, holdsOriginInside, holdsOriginOnBoundary, lengthsOf, MOST_PAIRS, placedHull, problemOf, readDirection, require} from 'hulld/proof/certificate.js';
+import {areFinite, checkExactly, checkPlacement, checkRelation, differences, gapSign, holdsOriginInside, holdsOriginOnBoundary, lengthsOf, MAX_PAIRS, placedHull, problemOf, readDirection, require} from 'hulld/proof/certificate.js';
 import {combination, commonExponent, dot, rotationForm, scaled, sum, toInteger, toIntegers} from 'hulld/proof/exact.js';
 
 const negated = (n) => scaled(-1n, n);
@@ -206,7 +206,7 @@ class MovingPair {
   // hulls at these times span all hulls in between; one of them holds 0 if the span does.
   checkBriefContact(bracket, certificate) {
     const span = bracket.flatMap(
-        (time) => differences(MOST_PAIRS.RELATION_TOUCHING, certificate, ...this.hullsAt(time)));
+        (time) => differences(MAX_PAIRS.RELATION_TOUCHING, certificate, ...this.hullsAt(time)));
     require(
         holdsOriginInside(span) || holdsOriginOnBoundary(span),
         'the vertex pairs show no common point up to contact_time');

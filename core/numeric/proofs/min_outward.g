@@ -19,7 +19,7 @@ compared = value * (1 + c);
   /\ |p1| <= 3.465 /\ |p2| <= 3.465 /\ |p3| <= 3.465 /\ |c| <= 10b-53
   /\ |x1| <= 1 /\ |x2| <= 1 /\ |x3| <= 1 /\ |y1| <= 1 /\ |y2| <= 1 /\ |y3| <= 1
   /\ |z1| <= 1 /\ |z2| <= 1 /\ |z3| <= 1
-  -> |compared - exact| <= kLeastOutward }
+  -> |compared - exact| <= kMinOutward }
 
 n1 - N1 -> (n1 - M1) + (M1 - N1);
 n2 - N2 -> (n2 - M2) + (M2 - N2);
@@ -32,4 +32,4 @@ value - exact -> (value - (p1 * n1 + p2 * n2 + p3 * n3))
   - (256b-53 * (z1 * N1 + z2 * N2 + z3 * N3));
 compared - exact -> (value - exact) + value * c;
 
-# Refused: kLeastOutward * 0.25
+# Refused: kMinOutward * 0.25
