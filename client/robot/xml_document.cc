@@ -240,7 +240,7 @@ absl::StatusOr<std::vector<double>> NumbersOf(const XmlDocument& document,
   if (element.Attribute(attribute) == nullptr) {
     return error(absl::StrCat("lacks ", attribute, "=\"...\""));
   }
-  return error(absl::StrCat(attribute, " takes ", count, count == 1 ? " number" : " numbers",
+  return error(absl::StrCat(attribute, " needs ", count, count == 1 ? " number" : " numbers",
                             ", got ", numbers.size()));
 }
 

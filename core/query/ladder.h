@@ -40,11 +40,11 @@ enum class Purpose {
 };
 
 // Decides the relation by a ladder of rungs, each of which answers only if its own error bound
-// proves it: bounding spheres; the cache; for the relation alone, bounds of the
-// hulls along the line of their centers; the hulls in floating point; exact arithmetic. Fills
-// `decision`, which must be newly constructed. Requires: tolerance >= 0. Updates the cache, which
-// may be null and otherwise belongs to these two hulls. CANCELLED: should_stop, which may be empty,
-// returned true; only the exact rung polls it.
+// proves it: bounding spheres; the cache; for the relation alone, bounds of the hulls along the
+// line of their centers; the hulls in floating point; exact arithmetic. Fills `decision`, which
+// must be newly constructed. Requires: tolerance >= 0. Updates the cache, which may be null and
+// otherwise belongs to these two hulls. CANCELLED: should_stop, which may be empty, returned true;
+// only the exact rung polls it.
 absl::Status Decide(const FloatPair& pair, double tolerance, PairCache* cache, Purpose purpose,
                     const std::function<bool()>& should_stop, Decision& decision);
 

@@ -433,8 +433,7 @@ TEST_F(StreamCollisionsCall, ManyPlacementsThatMoveMayHaveFewPairsOrNone) {
   EXPECT_TRUE(stream.Finish().ok());
 }
 
-// Steps of any size, some with a refresh: several threads place and decide many
-// placements.
+// Steps of any size, some with a refresh: several threads place and decide many placements.
 TEST_F(StreamCollisionsCall, RandomStepsAreAnsweredAsInABatch) {
   Put("cube", Cube());
   Put("ball", Sphere(60));

@@ -41,7 +41,7 @@ class Pose:
             given = tuple(getattr(self, name))
             if len(given) != len(letters):
                 raise ValueError(
-                    f"{name} has {len(given)} numbers; it takes {len(letters)}, "
+                    f"{name} has {len(given)} numbers; it needs {len(letters)}: "
                     f"{' '.join(letters)}"
                 )
             values = tuple(arguments.number(v, f"{name}[{i}]") for i, v in enumerate(given))
@@ -212,7 +212,7 @@ def _reordered(rows: npt.NDArray[np.float64], order: QuaternionOrder) -> npt.NDA
     if order == "wxyz":
         return rows
     if order != "xyzw":
-        raise ValueError(f'quaternion_order is {order!r}; it takes "wxyz" or "xyzw"')
+        raise ValueError(f'quaternion_order is {order!r}; it must be "wxyz" or "xyzw"')
     return np.concatenate([rows[:, 3:4], rows[:, :3], rows[:, 4:]], axis=1)
 
 

@@ -54,7 +54,7 @@ class Element:
                 raise self.error(f"<{self.tag}> {name}: {word!r} is not a finite number")
         if len(words) != count:
             numbers = "number" if count == 1 else "numbers"
-            raise self.error(f"<{self.tag}> {name} takes {count} {numbers}, got {len(words)}")
+            raise self.error(f"<{self.tag}> {name} needs {count} {numbers}, got {len(words)}")
         return [float(word) for word in words]
 
     def number(self, name: str, default: float) -> float:
