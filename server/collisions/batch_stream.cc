@@ -2,7 +2,6 @@
 
 #include "core/query/collision.h"
 #include "server/collisions/placed/query_settings.h"
-#include "server/contract/status_map.h"
 #include "server/wire/answer_columns.h"
 #include "server/wire/decode.h"
 

@@ -7,7 +7,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
-#include <vector>
 
 #include "core/query/motion/first_contact.h"
 #include "hulld/v1/collision.pb.h"

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "server/collisions/placed/query_settings.h"
-#include "server/contract/status_map.h"
 #include "server/process/metrics.h"
 #include "server/registry/catalog/body.h"
 #include "server/settings/config.h"
@@ -106,7 +105,9 @@ void PairQuestion::AnswerLater() {
 }
 
 bool PairQuestion::TryAnswer() {
-  if (!table_.TryResolve(parts_.registry, options_, plan_)) return false;
+  ReadPlan plan = plan_;
+  plan.may_wait = false;
+  if (!table_.Resolve(parts_.registry, options_, plan).ok()) return false;
   AnswerResolved();
   return true;
 }

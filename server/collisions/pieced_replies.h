@@ -12,13 +12,10 @@
 #include <deque>
 #include <functional>
 #include <memory>
-#include <span>
-#include <string>
 #include <utility>
 #include <vector>
 
 #include "core/base/check.h"
-#include "core/query/terms/answer.h"
 #include "server/call/queued_stream.h"
 #include "server/collisions/placed/collision_parts.h"
 #include "server/collisions/placed/placement_table.h"
@@ -112,10 +109,8 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   PiecedReplies(const Bytes& request, CallContext& context, Rpc rpc, const CollisionParts& parts,
                 const Shape& shape)
       : Base(request, context, parts.admission, rpc),
-        registry_(parts.registry),
-        readers_(parts.long_readers),
+        parts_(parts),
         lane_(parts.pool),
-        waiting_(parts.waiting),
         max_pieces_(2 * static_cast<size_t>(parts.pool.threads())),
         shape_(shape),
         charge_(parts.registry.memory(), MemoryUse::kReading),
@@ -133,17 +128,18 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   // For Validate: decodes the query, its freshness, and the placements. what: as in "the batch".
   absl::Status DecodePlacements(v1::Method method, const char* what) {
     const Request& request = this->request();
-    absl::StatusOr<QueryOptions> query = MakeQueryOptions(
-        method, request.wanted(), request.tolerance(), registry_.limits(), this->call().lifetime());
+    absl::StatusOr<QueryOptions> query =
+        MakeQueryOptions(method, request.wanted(), request.tolerance(), registry().limits(),
+                         this->call().lifetime());
     if (!query.ok()) return query.status();
     query_ = *std::move(query);
     const absl::StatusOr<Freshness> freshness =
-        DecodeFreshness(request.freshness(), registry_.store(), this->call().arrival());
+        DecodeFreshness(request.freshness(), registry().store(), this->call().arrival());
     if (!freshness.ok()) return freshness.status();
     freshness_ = *freshness;
     absl::StatusOr<PlacementTable> table =
         PlacementTable::Make(request.placements(), *this->own_request().mutable_packed_placements(),
-                             this->call().caller(), registry_.limits().max_placements, what);
+                             this->call().caller(), registry().limits().max_placements, what);
     if (!table.ok()) return table.status();
     table_ = *std::move(table);
     if (!table_.has_motions()) return absl::OkStatus();
@@ -152,13 +148,13 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     return absl::OkStatus();
   }
 
-  Registry& registry() { return registry_; }
+  Registry& registry() { return parts_.registry; }
 
   // Runs `work` on disjoint ranges that cover [0, count), on several threads concurrently for a
   // long call. Used by the steps above.
   void ShareOut(size_t count, size_t step, const std::function<void(size_t, size_t)>& work) {
     if (IsShort()) return work(0, count);
-    SharedLoop::Run(readers_, max_pieces_ / 2 - 1, count, step, work);
+    SharedLoop::Run(parts_.long_readers, max_pieces_ / 2 - 1, count, step, work);
   }
 
   // Performs a step on the next unit of the piece, which takes a few microseconds, or until `end`
@@ -228,7 +224,7 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   // thread.
   void Open() final {
     if (IsShort()) return this->RunOn(lane_, [this] { OpenWith(Validate(), false); });
-    this->RunOn(readers_, [this] {
+    this->RunOn(parts_.long_readers, [this] {
       absl::Status status = Validate();
       if (status.ok()) status = Charge();
       if (!status.ok() || !AwaitsFresh()) OpenWith(status, true);
@@ -240,9 +236,9 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   bool AwaitsFresh() {
     const auto should_stop = [this] { return this->call().ShouldStop(); };
     const auto open = [this, self = this->shared_from_this()](const absl::Status& status) {
-      this->RunOn(readers_, [this, status] { OpenWith(status, true); });
+      this->RunOn(parts_.long_readers, [this, status] { OpenWith(status, true); });
     };
-    return waiting_.AwaitFresh(registry_, freshness_, should_stop, open);
+    return parts_.waiting.AwaitFresh(registry(), freshness_, should_stop, open);
   }
 
   void OpenWith(absl::Status status, bool may_wait) {
@@ -251,7 +247,7 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
       const absl::StatusOr<bool> resolved = Resolve(may_wait);
       if (resolved.ok() && !*resolved) {
         if (AwaitsFresh()) return;
-        return this->RunOn(readers_, [this] { OpenWith(absl::OkStatus(), true); });
+        return this->RunOn(parts_.long_readers, [this] { OpenWith(absl::OkStatus(), true); });
       }
       status = resolved.status();
     }
@@ -272,10 +268,10 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   // Resolves the hulls. Returns false if that could block and `may_wait` is false.
   absl::StatusOr<bool> Resolve(bool may_wait) {
     const ReadPlan plan = {2 * expected_pairs_ / std::max<uint64_t>(1, table_.hull_count()), true,
-                           freshness_};
-    if (!may_wait) return table_.TryResolve(registry_, query_, plan);
-    if (absl::Status s = table_.Resolve(registry_, query_, plan); !s.ok()) return s;
-    return true;
+                           freshness_, may_wait};
+    absl::Status resolved = table_.Resolve(registry(), query_, plan);
+    if (may_wait && !resolved.ok()) return resolved;
+    return resolved.ok();
   }
 
   // Charges the call's memory. RESOURCE_EXHAUSTED: no room for it. A small call is admitted
@@ -284,7 +280,7 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     fixed_bytes_ = HeldBytes();
     charge_.Set(fixed_bytes_);
     if (fixed_bytes_ <= kSmallBytes) return absl::OkStatus();
-    return registry_.CheckMemory(MemoryUse::kReading);
+    return registry().CheckMemory(MemoryUse::kReading);
   }
 
   // Works on the piece until `end`, or until it is done.
@@ -329,7 +325,7 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   // of the table follows.
   bool QueueHead() {
     Reply head;
-    if (next_row_ == 0) table_.EncodeHeader(registry_.store(), head.mutable_header());
+    if (next_row_ == 0) table_.EncodeHeader(registry().store(), head.mutable_header());
     next_row_ = table_.EncodeHulls(next_row_, &head);
     const size_t bytes = head.ByteSizeLong();
     this->Queue(std::move(head), bytes);
@@ -391,10 +387,8 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
         static_cast<uint64_t>(std::clamp(wanted, 1.0, static_cast<double>(shape_.max_units)));
   }
 
-  Registry& registry_;
-  WorkerPool& readers_;
+  const CollisionParts& parts_;
   TaskPool::Lane lane_;
-  WaitingCalls& waiting_;
   const size_t max_pieces_;
   const Shape shape_;
 

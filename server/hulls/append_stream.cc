@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "core/base/check.h"
-#include "server/contract/status_map.h"
 #include "server/process/random_id.h"
 #include "server/wire/decode.h"
 #include "server/wire/encode.h"

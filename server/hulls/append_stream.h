@@ -6,7 +6,6 @@
 #include <grpcpp/grpcpp.h>
 
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <string>
 

@@ -1,10 +1,8 @@
 #include "server/hulls/hull_service.h"
 
 #include <absl/status/status.h>
-#include <absl/strings/str_cat.h>
 
 #include <memory>
-#include <utility>
 
 #include "core/hull/audit.h"
 #include "core/hull/properties.h"

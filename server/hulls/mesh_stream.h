@@ -5,8 +5,6 @@
 
 #include <cstddef>
 #include <memory>
-#include <optional>
-#include <string>
 
 #include "hulld/v1/hull.pb.h"
 #include "server/call/pulled_stream.h"

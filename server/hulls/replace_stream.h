@@ -5,7 +5,6 @@
 #include <grpcpp/grpcpp.h>
 
 #include <cstdint>
-#include <memory>
 
 #include "core/hull/growth/hull_builder.h"
 #include "hulld/v1/hull.pb.h"

@@ -76,11 +76,12 @@ absl::StatusOr<HullView> ServeBody(Registry& registry, const std::shared_ptr<con
 }
 
 // Builds canonical snapshots of the resolved hulls, and their query structures. CANCELLED:
-// should_stop returned true.
+// should_stop returned true. WouldWait: some are not built, and may_wait is false.
 absl::Status MakeCanonical(Registry& registry, const std::function<bool()>& should_stop,
-                           std::vector<absl::StatusOr<HullView>>& hulls) {
+                           bool may_wait, std::vector<absl::StatusOr<HullView>>& hulls) {
   for (absl::StatusOr<HullView>& hull : hulls) {
-    if (!hull.ok()) continue;
+    if (!hull.ok() || hull->served->has_canonical_query_hull()) continue;
+    if (!may_wait) return WouldWait();
     absl::Status made = registry.reader().Canonical(*hull, should_stop).status();
     if (made.ok()) made = hull->served->MakeCanonicalQueryHull(should_stop);
     if (absl::IsCancelled(made)) return made;
@@ -90,19 +91,22 @@ absl::Status MakeCanonical(Registry& registry, const std::function<bool()>& shou
 }
 
 ReadPlan PlanOf(const PlacedLookup& lookup) {
-  return lookup.canonical ? ReadPlan{.freshness = lookup.plan.freshness} : lookup.plan;
+  const ReadPlan& plan = lookup.plan;
+  return lookup.canonical ? ReadPlan{.freshness = plan.freshness, .may_wait = plan.may_wait} : plan;
 }
 
 // Returns the bodies among the IDs; empty if there are none. Omits IDs that cannot be read now: the
-// subsequent hull lookup reports their errors. CANCELLED, RESOURCE_EXHAUSTED: as FindBodies.
+// subsequent hull lookup reports their errors. Otherwise as BodyRegistry::Find. WouldWait also if
+// there are bodies, whose boxes must be built.
 absl::StatusOr<Bodies> BodiesAmong(Registry& registry, std::span<const std::string> ids,
-                                   const std::function<bool()>& should_stop) {
+                                   const std::function<bool()>& should_stop, bool may_wait) {
   if (!registry.has_bodies()) return Bodies();
-  FoundBodies found = registry.bodies().Find(ids, should_stop);
+  FoundBodies found = registry.bodies().Find(ids, should_stop, may_wait);
   if (!found.status.ok() && !absl::IsUnavailable(found.status)) return found.status;
   if (std::ranges::all_of(found.bodies, [](const auto& body) { return body == nullptr; })) {
     return Bodies();
   }
+  if (!may_wait) return WouldWait();
   return std::move(found.bodies);
 }
 
@@ -170,13 +174,15 @@ absl::StatusOr<Resolved> ResolvePlaced(Registry& registry, std::span<const std::
 absl::StatusOr<Resolved> RefreshPlaced(Registry& registry, std::span<const std::string> ids,
                                        KnownPlaced& known, const PlacedLookup& lookup,
                                        const std::function<bool()>& should_stop) {
-  if (lookup.shapes != nullptr && known.shapes_.empty()) {
+  const bool may_wait = lookup.plan.may_wait;
+  if (lookup.shapes != nullptr && !lookup.shapes->empty() && known.shapes_.empty()) {
+    if (!may_wait) return WouldWait();
     absl::StatusOr<std::vector<HullView>> built =
         BuildInlineShapes(registry, *lookup.shapes, should_stop);
     if (!built.ok()) return built.status();
     known.shapes_ = *std::move(built);
   }
-  absl::StatusOr<Bodies> bodies = BodiesAmong(registry, ids, should_stop);
+  absl::StatusOr<Bodies> bodies = BodiesAmong(registry, ids, should_stop, may_wait);
   absl::StatusOr<Resolved> hulls;
   do {
     if (!bodies.ok()) return bodies.status();
@@ -185,11 +191,12 @@ absl::StatusOr<Resolved> RefreshPlaced(Registry& registry, std::span<const std::
         known.has_bodies() ? std::span<const std::string>(known.hull_ids_) : ids, known.hulls_,
         should_stop, PlanOf(lookup));
     if (!hulls.ok()) return hulls;
-    bodies = BodiesAmong(registry, ids, should_stop);
+    bodies = BodiesAmong(registry, ids, should_stop, may_wait);
   } while (!bodies.ok() || !known.AreBodies(*bodies));
   // The resolved snapshots are immutable, so building may take long.
   if (lookup.canonical) {
-    if (absl::Status s = MakeCanonical(registry, should_stop, hulls->hulls); !s.ok()) return s;
+    absl::Status s = MakeCanonical(registry, should_stop, may_wait, hulls->hulls);
+    if (!s.ok()) return s;
   }
   const auto add_shapes = [&known](std::vector<absl::StatusOr<HullView>>& to) {
     to.insert(to.end(), known.shapes_.begin(), known.shapes_.end());
@@ -209,26 +216,6 @@ absl::StatusOr<Resolved> RefreshPlaced(Registry& registry, std::span<const std::
                                  : ServeBody(registry, known.bodies_[i], lookup, find_hull));
   }
   add_shapes(resolved.hulls);
-  return resolved;
-}
-
-std::optional<Resolved> TryResolvePlaced(Registry& registry, std::span<const std::string> ids,
-                                         const PlacedLookup& lookup) {
-  if (lookup.shapes != nullptr && !lookup.shapes->empty()) return std::nullopt;
-  if (registry.has_bodies()) {
-    const std::optional<FoundBodies> found = registry.bodies().TryFind(ids);
-    if (!found.has_value()) return std::nullopt;
-    const auto is_none = [](const auto& body) { return body == nullptr; };
-    if (!std::ranges::all_of(found->bodies, is_none)) return std::nullopt;
-  }
-  std::optional<Resolved> resolved = registry.reader().TryResolve(ids, PlanOf(lookup));
-  if (!resolved.has_value()) return resolved;
-  for (const absl::StatusOr<HullView>& hull : resolved->hulls) {
-    // A body may have been put under the ID since the lookup of bodies.
-    if (absl::IsNotFound(hull.status()) && registry.has_bodies()) return std::nullopt;
-    if (!lookup.canonical || !hull.ok()) continue;
-    if (!hull->served->has_canonical_query_hull()) return std::nullopt;
-  }
   return resolved;
 }
 

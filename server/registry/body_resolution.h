@@ -6,7 +6,6 @@
 #include <cstddef>
 #include <functional>
 #include <memory>
-#include <optional>
 #include <span>
 #include <string>
 #include <unordered_map>
@@ -73,8 +72,9 @@ class KnownPlaced {
 // shapes. If a body has no hull for some piece, its result is an error: NOT_FOUND
 // (PIECE_NOT_FOUND), PERMISSION_DENIED, or DATA_LOSS, which names body and piece;
 // RESOURCE_EXHAUSTED: --memory-limit has no room for its pieces. Without bodies, equivalent to
-// HullReader::Refresh. Builds boxes of pieces, so it must not run on a gRPC thread. CANCELLED:
-// should_stop returned true.
+// HullReader::Refresh. Builds boxes of pieces, so it must not run on a gRPC thread unless
+// plan.may_wait is false: WouldWait then includes bodies and inline shapes. CANCELLED: should_stop
+// returned true.
 absl::StatusOr<Resolved> ResolvePlaced(Registry& registry, std::span<const std::string> ids,
                                        const PlacedLookup& lookup,
                                        const std::function<bool()>& should_stop);
@@ -85,11 +85,6 @@ absl::StatusOr<Resolved> ResolvePlaced(Registry& registry, std::span<const std::
 absl::StatusOr<Resolved> RefreshPlaced(Registry& registry, std::span<const std::string> ids,
                                        KnownPlaced& known, const PlacedLookup& lookup,
                                        const std::function<bool()>& should_stop);
-
-// As ResolvePlaced, but returns nullopt without blocking if it would have to read, prepare, or
-// build, or if an ID belongs to a body.
-std::optional<Resolved> TryResolvePlaced(Registry& registry, std::span<const std::string> ids,
-                                         const PlacedLookup& lookup);
 
 // PERMISSION_DENIED, naming the piece: the hull of a piece is outside the caller's prefix.
 absl::Status CheckPiecePrefix(const Body& body, const std::string& prefix);

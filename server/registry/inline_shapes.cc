@@ -1,7 +1,6 @@
 #include "server/registry/inline_shapes.h"
 
 #include <memory>
-#include <utility>
 
 #include "core/base/check.h"
 #include "core/hull/growth/hull_builder.h"

@@ -28,48 +28,38 @@ Registry::Registry(Store& store, const Limits& limits, WorkerPool& writers,
 
 Registry::~Registry() {
   barrier_->End();
-  {
-    const Locked locked(state_.mutex);
-    state_.preparer.Stop(locked);
-  }
+  state_.EndPreparing();
   // Its thread applies peer changes to the parts that are destroyed below.
   committer_.End();
-  state_.preparer.End();
   loaders_.reset();
   // Closed sessions may outlive this while they hold hulls.
   const std::lock_guard lock(state_.mutex);
-  for (const auto& [id, hull] : state_.catalog.hulls().entries()) {
+  for (const auto& [id, hull] : state_.hulls.entries()) {
     if (hull.awake() != nullptr) hull.awake()->account.Close();
   }
 }
 
 absl::Status Registry::Load() {
   Locked locked(state_.mutex);
-  Catalog& catalog = state_.catalog;
   Store& store = state_.store;
-  catalog.Begin(store.revision());
-  state_.feed.Begin(catalog.revision(), records_);
-  absl::Status status;
-  if (catalog.is_cache()) {
-    catalog.SetTotals(store.totals());
+  state_.Begin(store.revision(), records_);
+  if (state_.is_cache()) {
+    state_.SetTotals(store.totals());
   } else {
-    status = store.ForEachHull([&](const std::string& id, absl::StatusOr<StoredHull> stored) {
-      catalog.AddStored(id, stored);
-    });
-  }
-  if (catalog.statistics().damaged > 0) {
-    spdlog::error("{} of {} hulls are damaged", catalog.statistics().damaged,
-                  catalog.hulls().size());
-  }
-  if (status.ok() && !catalog.is_cache()) {
+    absl::Status status =
+        store.ForEachHull([&](const std::string& id, const absl::StatusOr<StoredHull>& stored) {
+          state_.AddStored(id, stored);
+        });
+    if (state_.statistics.damaged > 0) {
+      spdlog::error("{} of {} hulls are damaged", state_.statistics.damaged, state_.hulls.size());
+    }
+    if (!status.ok()) return status;
     status = store.ForEachBody([&](const std::string& id, const absl::StatusOr<StoredBody>& body) {
-      if (catalog.hulls().contains(id)) return Catalog::LogBodyUnderHull(id);
-      catalog.AddBody(locked, id, body);
-      catalog.NoteBodyFound();
+      state_.AddStoredBody(locked, id, body);
     });
+    if (!status.ok()) return status;
   }
-  if (status.ok()) status = barrier_->Begin(locked, {&changes_, &records_});
-  return status;
+  return barrier_->Begin(locked, {&changes_, &records_});
 }
 
 absl::StatusOr<Resolved> Registry::Resolve(std::span<const std::string> ids,
@@ -98,18 +88,18 @@ void Registry::RestIdleHulls() {
   std::string cursor;
   for (bool more = true; more;) {
     Locked locked(state_.mutex);
-    more = state_.catalog.hulls().RestIdle(locked, cursor);
+    more = state_.hulls.RestIdle(locked, cursor);
   }
 }
 
 RegistrySizes Registry::Sizes() const {
   const std::lock_guard lock(state_.mutex);
-  return state_.catalog.Sizes();
+  return state_.Sizes();
 }
 
 CacheStatistics Registry::Cache() const {
   const std::lock_guard lock(state_.mutex);
-  CacheStatistics cache = state_.catalog.statistics();
+  CacheStatistics cache = state_.statistics;
   static_cast<MemoryStatistics&>(cache) = state_.memory.Statistics();
   return cache;
 }

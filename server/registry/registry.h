@@ -3,9 +3,7 @@
 
 #include <absl/status/statusor.h>
 
-#include <chrono>
 #include <cstddef>
-#include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -28,7 +26,6 @@
 #include "server/registry/records/record_reader.h"
 #include "server/registry/state/registry_state.h"
 #include "server/registry/watch/change_feed.h"
-#include "server/registry/watch/page_source.h"
 #include "server/settings/config.h"
 #include "server/store/store.h"
 
@@ -40,7 +37,8 @@ namespace hulld::server {
 //   RegistryState  the state that the parts share, and the only functions that apply a committed
 //                  change to it
 //   Committer      commits changes to the store in batches, in the order of submission
-//   ReadBarrier    blocks a call until the catalog satisfies its freshness; PeerSync replaces it if
+//   ReadBarrier    blocks a call until the registry satisfies its freshness; PeerSync replaces it
+//   if
 //                  peer servers commit to the same store, and applies their changes
 //   RecordReader   loads and lists records if the store finds records
 //   HullChanges    creates, deletes, replaces, and grows hulls
@@ -89,8 +87,8 @@ class Registry {
   // the store finds records. Replaces the default derived from --memory-limit. Call before Load;
   // for tests.
   void KeepRecords(size_t most) {
-    state_.catalog.hulls().KeepAtMost(most);
-    state_.catalog.bodies().KeepAtMost(most * 2 * BodyTable::kBytesOfEntry);
+    state_.hulls.KeepAtMost(most);
+    state_.bodies.KeepAtMost(most * 2 * BodyTable::kBytesOfEntry);
   }
 
   const Store& store() const { return state_.store; }
@@ -110,7 +108,7 @@ class Registry {
   // True if peer servers commit to the same store, so that reads may wait for their changes.
   bool has_peers() const { return barrier_->has_peers(); }
   // False if no body exists. Takes no lock.
-  bool has_bodies() const { return state_.catalog.BodyCount() > 0; }
+  bool has_bodies() const { return state_.BodyCount() > 0; }
 
   // Returns at most `page_size` hulls, or bodies, or both, with IDs that start with `prefix` and
   // follow `after` in byte order; a page of bodies may contain fewer even if more follow. If the
@@ -148,7 +146,7 @@ class Registry {
   // CANCELLED: should_stop returned true. FAILED_PRECONDITION, UNAVAILABLE: as AwaitFresh.
   // RESOURCE_EXHAUSTED: hulls must be read from the store, or there are more than
   // kMaxLookupsPerHold, while readers exceed their share of --memory-limit; without a retry delay
-  // if these hulls account for most of it.
+  // if these hulls account for most of it. WouldWait: see ReadPlan::may_wait.
   absl::StatusOr<Resolved> Resolve(std::span<const std::string> ids,
                                    const std::function<bool()>& should_stop,
                                    const ReadPlan& plan = {});

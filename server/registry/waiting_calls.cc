@@ -8,19 +8,17 @@
 
 namespace hulld::server {
 
-WaitingCalls::Wait::Done WaitingCalls::Wait::Take() {
-  const std::lock_guard lock(mutex_);
-  if (done_ == nullptr) return nullptr;
-  --calls_.count_;
-  should_stop_ = nullptr;
-  return std::exchange(done_, nullptr);
-}
-
 void WaitingCalls::Wait::Finish(const absl::Status& status) {
-  if (const Done done = Take(); done != nullptr) done(status);
+  Done done;
+  {
+    const std::lock_guard lock(mutex_);
+    if (done_ == nullptr) return;
+    --calls_.count_;
+    should_stop_ = nullptr;
+    done = std::exchange(done_, nullptr);
+  }
+  done(status);
 }
-
-bool WaitingCalls::Wait::Withdraw() { return Take() != nullptr; }
 
 // The state that should_stop reads lives until the wait is over, so it is called under the mutex.
 bool WaitingCalls::Wait::EndIfStopped() {
@@ -61,12 +59,11 @@ std::shared_ptr<WaitingCalls::Wait> WaitingCalls::Add(
 bool WaitingCalls::AwaitFresh(Registry& registry, const Freshness& freshness,
                               std::function<bool()> should_stop,
                               std::function<void(const absl::Status&)> done) {
-  if (!registry.has_peers()) return false;
+  ReadBarrier& barrier = registry.barrier();
+  if (!registry.has_peers() || barrier.TryFresh(freshness).has_value()) return false;
   const std::shared_ptr<Wait> wait = Add(std::move(should_stop), std::move(done));
-  const bool asks = registry.barrier().StartFresh(
-      freshness, [wait](const absl::Status& status) { wait->Finish(status); });
-  // If the wait is already over, it was cancelled and `done` was called.
-  return asks || !wait->Withdraw();
+  barrier.StartFetch([wait](const absl::Status& status) { wait->Finish(status); });
+  return true;
 }
 
 void WaitingCalls::Run() {

@@ -7,7 +7,6 @@
 #include <cstddef>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <utility>
 #include <vector>
 
@@ -20,13 +19,11 @@ namespace hulld::server {
 // calls; it sleeps while no call waits. Thread-safe.
 class WaitingCalls {
  public:
-  // A waiting call. It is over after Finish or Withdraw; its functions are not called after that.
+  // A waiting call. It is over after Finish; its functions are not called after that.
   class Wait {
    public:
     // Calls `done` unless the wait is over.
     void Finish(const absl::Status& status);
-    // Ends the wait without calling `done`. Returns false if it was already over.
-    bool Withdraw();
 
    private:
     friend class WaitingCalls;
@@ -34,8 +31,6 @@ class WaitingCalls {
 
     Wait(WaitingCalls& calls, std::function<bool()> should_stop, Done done)
         : calls_(calls), should_stop_(std::move(should_stop)), done_(std::move(done)) {}
-    // Ends the wait and returns `done`; empty if the wait was already over.
-    Done Take();
     // Ends the wait if should_stop returns true. Returns true if the next poll must check it again.
     bool EndIfStopped();
 
@@ -58,7 +53,7 @@ class WaitingCalls {
                             std::function<void(const absl::Status&)> done);
 
   // Calls `done` as above when the registry satisfies `freshness`. Returns false and does nothing
-  // if it already does. Cost: as ReadBarrier::StartFresh.
+  // if it already does. Cost: as ReadBarrier::StartFetch.
   bool AwaitFresh(Registry& registry, const Freshness& freshness, std::function<bool()> should_stop,
                   std::function<void(const absl::Status&)> done);
 

@@ -1,7 +1,5 @@
 #include "server/collisions/placed/live_pairs.h"
 
-#include <absl/strings/str_cat.h>
-
 #include <algorithm>
 
 #include "server/collisions/placed/scene_groups.h"

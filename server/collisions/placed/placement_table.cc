@@ -320,7 +320,7 @@ size_t PlacementTable::BodyBytes() const {
 }
 
 PlacedLookup PlacementTable::LookupFor(const QueryOptions& options, const ReadPlan& plan) const {
-  return {options.WantsCanonical(), prefix_, plan};
+  return {options.WantsCanonical(), prefix_, plan, &shapes_};
 }
 
 absl::Status PlacementTable::Resolve(Registry& registry, const QueryOptions& options,
@@ -336,22 +336,10 @@ absl::Status PlacementTable::Refresh(Registry& registry, const QueryOptions& opt
 
 absl::Status PlacementTable::ResolveFrom(Registry& registry, KnownPlaced& known,
                                          const QueryOptions& options, const ReadPlan& plan) {
-  PlacedLookup lookup = LookupFor(options, plan);
-  lookup.shapes = &shapes_;
   absl::StatusOr<Resolved> resolved =
-      RefreshPlaced(registry, ids_, known, lookup, options.should_stop);
+      RefreshPlaced(registry, ids_, known, LookupFor(options, plan), options.should_stop);
   if (!resolved.ok()) return resolved.status();
-  shapes_ = {};
   SetHulls(registry.store(), *std::move(resolved), options);
-  return absl::OkStatus();
-}
-
-absl::Status PlacementTable::AddShapes(Registry& registry, const std::function<bool()>& should_stop,
-                                       Resolved* resolved) {
-  absl::StatusOr<std::vector<HullView>> built = BuildInlineShapes(registry, shapes_, should_stop);
-  if (!built.ok()) return built.status();
-  shapes_ = {};
-  resolved->hulls.insert(resolved->hulls.end(), built->begin(), built->end());
   return absl::OkStatus();
 }
 
@@ -376,16 +364,6 @@ void PlacementTable::SetSomeHulls(std::span<const size_t> hulls, Resolved resolv
   NoteProblems();
 }
 
-bool PlacementTable::TryResolve(Registry& registry, const QueryOptions& options,
-                                const ReadPlan& plan) {
-  PlacedLookup lookup = LookupFor(options, plan);
-  lookup.shapes = &shapes_;
-  std::optional<Resolved> resolved = TryResolvePlaced(registry, ids_, lookup);
-  if (!resolved.has_value()) return false;
-  SetHulls(registry.store(), *std::move(resolved), options);
-  return true;
-}
-
 // If the options need canonical snapshots, every resolved hull has one and queries use it.
 void PlacementTable::SetHulls(const Store& store, Resolved resolved, const QueryOptions& options) {
   std::vector<const QueryHull*> query_hulls;
@@ -404,6 +382,7 @@ void PlacementTable::SetHulls(const Store& store, Resolved resolved, const Query
   const std::vector<absl::StatusOr<HullView>> before = std::move(hulls_);
   hulls_ = std::move(resolved.hulls);
   query_hulls_ = std::move(query_hulls);
+  shapes_ = {};
   store_ = &store;
   as_of_ = resolved.as_of;
   NoteProblems();

@@ -7,13 +7,11 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
 #include <string>
 #include <unordered_map>
-#include <utility>
 #include <vector>
 
 #include "core/base/check.h"
@@ -60,14 +58,12 @@ class PlacementTable {
   void PlaceOnDemand() { places_on_demand_ = true; }
 
   // Resolves every hull and body once, all at one revision of the store, for queries with
-  // `options`. Not for gRPC threads. CANCELLED: options.should_stop returned true.
+  // `options`. Not for gRPC threads unless plan.may_wait is false. CANCELLED:
+  // options.should_stop returned true. WouldWait: see ReadPlan::may_wait.
   absl::Status Resolve(Registry& registry, const QueryOptions& options, const ReadPlan& plan);
 
   // As Resolve, for repeated calls: looks up only hulls that changed since the last one.
   absl::Status Refresh(Registry& registry, const QueryOptions& options, const ReadPlan& plan);
-
-  // As Resolve, but returns false without blocking if it would have to wait or build.
-  bool TryResolve(Registry& registry, const QueryOptions& options, const ReadPlan& plan);
 
   size_t size() const { return hull_of_.size(); }
   // Number of distinct hulls: those of hull_ids(), followed by those of the inline shapes.
@@ -120,12 +116,9 @@ class PlacementTable {
   // Earlier results refer to points of the previous QueryHull.
   bool query_hull_changed(size_t i) const;
 
-  // Returns the lookup of hull_ids() for queries with these options.
+  // Returns the lookup of hull_ids() and of the inline shapes for queries with these options.
+  // Refers to this table.
   PlacedLookup LookupFor(const QueryOptions& options, const ReadPlan& plan) const;
-  // Builds the hulls of the inline shapes and appends them to the resolved hull_ids(). CANCELLED:
-  // should_stop returned true. RESOURCE_EXHAUSTED: --memory-limit.
-  absl::Status AddShapes(Registry& registry, const std::function<bool()>& should_stop,
-                         Resolved* resolved);
   // Sets all hulls. resolved: the hulls of hull_ids(), followed by those of the inline shapes.
   void SetHulls(const Store& store, Resolved resolved, const QueryOptions& options);
   // Sets some of the hulls of hull_ids(), given by index, each once. All other hulls remain

@@ -154,8 +154,6 @@ absl::Status CollisionWatch::HandleOpen(v1::CollisionWatchOpen& open) {
       hulls_.Open(table_.hull_ids(), on_ready,
                   table_.LookupFor(options_, {kExpectedRounds * per_hull, true}), should_stop);
   if (!round.ok()) return round.status();
-  absl::Status built = table_.AddShapes(parts_.registry, should_stop, &round->resolved);
-  if (!built.ok()) return built;
   Locked([this] { has_changes_ = true; });
   table_.SetHulls(parts_.registry.store(), std::move(round->resolved), options_);
   revision_ = round->revision;

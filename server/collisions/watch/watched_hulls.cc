@@ -1,7 +1,6 @@
 #include "server/collisions/watch/watched_hulls.h"
 
 #include <algorithm>
-#include <numeric>
 #include <string_view>
 #include <utility>
 
@@ -14,11 +13,11 @@ namespace {
 // Bytes of a piece's hull: its ID twice and the nodes of a map and a set; a guess.
 size_t BytesOf(const std::string& id) { return 2 * id.size() + 256; }
 
-// Calls `visit` with the record of each hull and body in use.
+// Calls `visit` with the record of each hull and body in use, except those of inline shapes.
 template <typename Visit>
 void ForEachRecord(const Resolved& resolved, const Visit& visit) {
   for (const absl::StatusOr<HullView>& view : resolved.hulls) {
-    if (!view.ok()) continue;
+    if (!view.ok() || view->record.hull_id.empty()) continue;
     visit(view->record);
     if (view->body == nullptr) continue;
     for (const HullView& piece : view->body->hulls) visit(piece.record);
@@ -54,8 +53,9 @@ absl::StatusOr<WatchedHulls::Round> WatchedHulls::Open(std::span<const std::stri
   watch_ = *std::move(watch);
   Round round;
   if (absl::Status s = Resolve(std::move(all), should_stop, &round); !s.ok()) return s;
-  // Changes are applied here before the watch reports them.
+  // Changes are applied here before the watch reports them. Inline shapes do not change.
   lookup_.plan = {.freshness = Freshness::AnyStaleness()};
+  lookup_.shapes = nullptr;
   round.revision = revision_ = round.resolved.as_of.revision;
   return round;
 }

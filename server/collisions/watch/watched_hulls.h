@@ -37,7 +37,7 @@ class WatchedHulls {
     bool has_advanced = false;
     // Indices into the IDs, ascending.
     std::vector<size_t> places = {};
-    // Parallel to `places`.
+    // Parallel to `places`; in the first round, followed by the inline shapes of the lookup.
     Resolved resolved = {};
     // Hulls of pieces whose version is new to the client.
     std::vector<HullRecord> piece_hulls = {};
@@ -52,7 +52,7 @@ class WatchedHulls {
 
   // Watches these hulls and bodies and resolves all of them. IDs may repeat. on_ready: as in
   // ChangeFeed::Open; may be called before this returns. Requires that it was not called before.
-  // Errors: as ChangeFeed::Open, Registry::FindBodies and ResolvePlaced.
+  // Errors: as ChangeFeed::Open, BodyRegistry::Find and ResolvePlaced.
   absl::StatusOr<Round> Open(std::span<const std::string> ids, std::function<void()> on_ready,
                              const PlacedLookup& lookup, const std::function<bool()>& should_stop);
   // Resolves the hulls and bodies that changed. Requires that the watch does not wait.

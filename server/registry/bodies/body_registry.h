@@ -2,11 +2,9 @@
 #define HULLD_SERVER_REGISTRY_BODIES_BODY_REGISTRY_H_
 
 #include <absl/status/status.h>
-#include <absl/status/statusor.h>
 
 #include <cstdint>
 #include <functional>
-#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -50,29 +48,25 @@ class BodyRegistry {
   // need not exist. ALREADY_EXISTS: a hull has the ID; ABORTED: if_revision does not match;
   // RESOURCE_EXHAUSTED: --max-hulls, --memory-limit, or the disk is full; UNAVAILABLE: the store
   // cannot be written.
-  void Put(StoredBody body, std::optional<uint64_t> if_revision, Reply<PutBodyResult> done);
+  void Put(StoredBody stored, std::optional<uint64_t> if_revision,
+           const Reply<PutBodyResult>& done);
   // Removes a body. Replies with the store's revision, as Put. NOT_FOUND; ABORTED: if_revision does
   // not match; RESOURCE_EXHAUSTED: the disk is full; UNAVAILABLE: the store cannot be written.
-  void Delete(const std::string& id, std::optional<uint64_t> if_revision, Reply<uint64_t> done);
+  void Delete(const std::string& id, std::optional<uint64_t> if_revision,
+              const Reply<uint64_t>& done);
   // Loads unknown records from the store, so it must not run on a gRPC thread. Status: UNAVAILABLE:
   // the store cannot be read; CANCELLED: should_stop returned true; RESOURCE_EXHAUSTED: a read is
   // needed, and readers exceed their share of --memory-limit. Cost: O(log n) each, and one store
-  // query per kMaxLookupsPerHold; the mutex is released in between.
-  FoundBodies Find(std::span<const std::string> ids, const std::function<bool()>& should_stop = {});
-  // As Find, but returns nullopt without blocking if the store would have to be read.
-  std::optional<FoundBodies> TryFind(std::span<const std::string> ids);
+  // query per kMaxLookupsPerHold; the mutex is released in between. may_wait: as in ReadPlan.
+  FoundBodies Find(std::span<const std::string> ids, const std::function<bool()>& should_stop = {},
+                   bool may_wait = true);
 
  private:
-  void PutLocked(Locked& locked, const std::shared_ptr<Body>& body,
-                 std::optional<uint64_t> if_revision, const Reply<PutBodyResult>& done);
-  absl::Status CheckPut(const std::string& id, std::optional<uint64_t> if_revision);
-  void DeleteLocked(Locked& locked, const std::string& id, std::optional<uint64_t> if_revision,
-                    const Reply<uint64_t>& done);
+  absl::Status CheckPut(Locked& locked, const std::string& id, std::optional<uint64_t> if_revision);
+  absl::Status NoSuchBody(const std::string& id) const;
   void Submit(Locked& locked, Change change, Committer::Completion finish);
   void Complete(Locked& locked, const std::string& id, const Committer::Completion& finish,
                 const absl::Status& status, Change& change);
-  std::optional<FoundBodies> Find(Locked& locked, std::span<const std::string> ids,
-                                  const std::function<bool()>& should_stop, bool may_wait);
 
   RegistryState& state_;
   Committer& committer_;

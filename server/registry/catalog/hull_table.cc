@@ -159,12 +159,6 @@ void HullTable::Erase(const HullPointer& hull) {
   entry.is_absent_ = true;
 }
 
-HullTable::RestingHull HullTable::AtRest(const RegisteredHull& hull) {
-  RestingHull resting(hull.committed());
-  resting.box = hull.Describe().box;
-  return resting;
-}
-
 // Puts a hull to rest with its points if it is small and unused. Otherwise returns false.
 bool HullTable::RestCompact(Locked& locked, Entry& entry) {
   std::unique_ptr<CompactHull> compact =
@@ -178,8 +172,10 @@ bool HullTable::RestCompact(Locked& locked, Entry& entry) {
                             former.create_revision == record.create_revision &&
                             former.compact->writers == compact->writers;
   if (is_unchanged) compact = ExchangeCompact(entry, nullptr);
+  if (compact->points.empty() && compact->writers.empty()) compact = nullptr;
   ExchangeCompact(entry, nullptr);
-  entry.resting_ = AtRest(*entry.awake_);
+  entry.resting_ = RestingHull(entry.awake_->committed());
+  entry.resting_.box = entry.awake_->Describe().box;
   entry.awake_->account.Close();
   locked.Discard(std::exchange(entry.awake_, nullptr));
   ExchangeCompact(entry, std::move(compact));
@@ -224,7 +220,7 @@ bool HullTable::RestIdle(Locked& locked, std::string& cursor) {
   return true;
 }
 
-void HullTable::RestSome() {
+void HullTable::RestSome(Locked& locked) {
   auto next = entries_.upper_bound(hand_);
   for (int i = 0; i < kHullsPerStep; ++i) {
     if (next == entries_.end()) {
@@ -235,11 +231,8 @@ void HullTable::RestSome() {
     const auto looked_at = next++;
     Entry& entry = looked_at->second;
     if (entry.awake_ != nullptr) {
-      // The record alone must be able to restore the hull.
-      if (entry.awake_.use_count() > 1 || !entry.awake_->IsAtRest()) continue;
-      ExchangeCompact(entry, nullptr);
-      entry.resting_ = AtRest(*entry.awake_);
-      entry.awake_ = nullptr;
+      // A small hull in memory rests when it is idle (RestIdle).
+      if (entry.awake_->live() != nullptr || !RestCompact(locked, entry)) continue;
     }
     if (!is_cache() || entries_.size() <= *most_ || std::exchange(entry.is_used_, false)) continue;
     if (!entry.is_absent_) --size_;

@@ -149,7 +149,7 @@ class HullTable {
 
   // Advances the hand by kHullsPerStep and puts unused hulls to rest; a cache also evicts down to
   // its limit. Cost: O(log n).
-  void RestSome();
+  void RestSome(Locked& locked);
   static constexpr int kHullsPerStep = 4;
   // Visits the hulls after `cursor`, initially empty, within one hold of the mutex. Puts small
   // hulls to rest that are in memory, unused, and have not been looked up since the last visit.
@@ -188,7 +188,6 @@ class HullTable {
   void EraseEntry(Place place);
   Entry& Add(const std::string& id);
   void Wake(const std::string& id, Entry& entry);
-  static RestingHull AtRest(const RegisteredHull& hull);
   bool RestCompact(Locked& locked, Entry& entry);
   std::unique_ptr<CompactHull> ExchangeCompact(Entry& entry, std::unique_ptr<CompactHull> compact);
   void DropCompact();

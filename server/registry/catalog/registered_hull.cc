@@ -265,6 +265,11 @@ void RegisteredHull::EndLoading() {
   changed.notify_all();
 }
 
+bool RegisteredHull::WantsPreparing(uint64_t expected_questions) const {
+  return !is_preparing() && live() != nullptr && state.visible() &&
+         live()->WantsPreparing(committed_mark(), expected_questions);
+}
+
 void RegisteredHull::NotePrepared(Locked& locked) {
   // Nothing was appended since: the new mark releases the previous preparation.
   if (state.quiet() && !state.damaged()) SetCommittedMark(locked, live()->Now());
@@ -319,11 +324,6 @@ bool RegisteredHull::IsUnused() const {
   return state.life() == HullState::Life::kPresent && state.quiet() && !state.damaged() &&
          !is_loading() && !is_preparing() && in_flight_.sequence_readers == 0 && watches.empty() &&
          chunks.empty() && exclusive.empty();
-}
-
-bool RegisteredHull::IsAtRest() const {
-  return IsUnused() && live() == nullptr && builder() == nullptr && served_.canonical == nullptr &&
-         in_flight_.writers.empty();
 }
 
 std::unique_ptr<CompactHull> RegisteredHull::Compact() const {

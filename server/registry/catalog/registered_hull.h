@@ -163,6 +163,8 @@ class RegisteredHull {
   bool is_loading() const { return served_.is_loading; }
   void StartLoading() { served_.is_loading = true; }
   void EndLoading();
+  // True if past and expected queries pay for preparation, and no thread prepares the hull.
+  bool WantsPreparing(uint64_t expected_questions) const;
   // True if a thread prepares live(), or is about to.
   bool is_preparing() const { return served_.is_preparing; }
   void SetPreparing(bool prepares) { served_.is_preparing = prepares; }
@@ -182,8 +184,6 @@ class RegisteredHull {
   void NoteUse();
   // Updates the time of last use after a read that changed no memory. Cost: O(1).
   void NoteRead() { account.Touch(); }
-  // True if the stored record alone can restore the hull.
-  bool IsAtRest() const;
   // Returns the points and sequences that restore the hull together with its record; null unless it
   // is small and unused. Cost: O(points).
   std::unique_ptr<CompactHull> Compact() const;

@@ -68,7 +68,13 @@ struct ReadPlan {
   // another thread prepares the hull for later readers.
   bool prepare_first = false;
   Freshness freshness = {};
+  // If false, the read fails with WouldWait instead of blocking: it would have to query or read the
+  // store, to prepare a hull, or to build boxes or canonical snapshots.
+  bool may_wait = true;
 };
+
+// UNAVAILABLE, without a message, to avoid an allocation.
+inline absl::Status WouldWait() { return absl::Status(absl::StatusCode::kUnavailable, ""); }
 
 // Hulls at one revision of the store.
 struct Resolved {

@@ -114,10 +114,10 @@ void HullChanges::OpenLocked(Locked& locked, const std::shared_ptr<OpenRequest>&
   };
   const std::string& id = request->hull_id;
   const HullPointer known = std::exchange(request->known, nullptr);
-  if (!state_.catalog.IsKnown(id)) {
+  if (!state_.IsKnown(id)) {
     return records_.WhenKnown(locked, id, request->done, [this, request](Locked& later) {
-      const bool is_known = state_.catalog.IsKnown(request->hull_id);
-      if (is_known) request->known = state_.catalog.Find(request->hull_id);
+      const bool is_known = state_.IsKnown(request->hull_id);
+      if (is_known) request->known = state_.Find(request->hull_id);
       // Without a hull, no further store read is needed.
       if (is_known && request->known == nullptr) return OpenLocked(later, request);
       RunOpen(request);
@@ -127,10 +127,9 @@ void HullChanges::OpenLocked(Locked& locked, const std::shared_ptr<OpenRequest>&
                         [this, request](Locked&) { RunOpen(request); })) {
     return;
   }
-  const HullPointer hull = state_.catalog.Find(id);
+  const HullPointer hull = state_.Find(id);
   if (hull == nullptr) {
-    if (!request->create_if_absent)
-      return refuse(locked, state_.catalog.NoSuchHull(request->hull_id));
+    if (!request->create_if_absent) return refuse(locked, state_.NoSuchHull(request->hull_id));
     // The session opens in the completion of the creation, because the hull may be gone immediately
     // afterwards.
     return CreateNew(
@@ -158,7 +157,7 @@ void HullChanges::OpenSession(Locked& locked, const HullPointer& hull,
   HULLD_CHECK(hull->state.visible());
   OpenResult result;
   hull->watches.emplace(++last_watch_, std::move(request->on_gone));
-  result.store_revision = state_.catalog.revision();
+  result.store_revision = state_.revision();
   result.hull = hull->committed().record;
   result.last_sequence = last_sequence;
   result.session = {hull, request->writer_id, request->created_hull, last_watch_, request->client};
@@ -204,7 +203,7 @@ void HullChanges::CloseAppend(const AppendSession& session) {
   if (hull.builder() == nullptr || hull.state.gone()) return;
   hull.DiscardUnneededBuilder(locked);
   hull.NoteUse();
-  state_.catalog.hulls().RestSoon(locked, hull);
+  state_.hulls.RestSoon(locked, hull);
 }
 
 void HullChanges::Append(const AppendSession& session, Chunk chunk,
@@ -265,7 +264,7 @@ void HullChanges::ApplyChunk(Locked& locked, const HullPointer& hull, PendingChu
     const HullRecord& record = hull->committed().record;
     return AnswerChunk(
         locked, pending.done, sequence,
-        ChunkResult{state_.catalog.revision(), true, record.revision, record.vertex_count, {}});
+        ChunkResult{state_.revision(), true, record.revision, record.vertex_count, {}});
   }
   absl::StatusOr<BuiltChunk> built = Build(locked, *hull, pending);
   if (Committer::IsSuperseded(built.status())) {
@@ -374,7 +373,7 @@ absl::StatusOr<std::shared_ptr<LiveHull>> HullChanges::LiveForWriter(Locked& loc
   if (hull.live() != nullptr) return hull.live();
   if (!loaded.ok()) return loaded.status();
   hull.SetLive(*std::move(loaded));
-  ++state_.catalog.statistics().loads;
+  ++state_.statistics.loads;
   hull.NoteUse();
   hull.changed.notify_all();
   return hull.live();
@@ -418,7 +417,7 @@ absl::StatusOr<PointCounts> HullChanges::AddPoints(PendingChunk& pending, LentBu
 
 // Returns the writer's status for a failure of AddPoints.
 absl::Status HullChanges::WhyNotBuilt(RegisteredHull& hull, const absl::Status& cause) {
-  if (absl::IsDataLoss(cause)) state_.catalog.MarkDamaged(hull, cause);
+  if (absl::IsDataLoss(cause)) state_.MarkDamaged(hull, cause);
   if (!absl::IsResourceExhausted(cause)) return cause;
   return LimitExceeded(
       absl::StrCat(QuotedHull(hull.head().record.hull_id), " would hold too many vertices"),
@@ -448,9 +447,9 @@ void HullChanges::SubmitChunk(Locked& locked, const HullPointer& hull, PendingCh
     }
     state_.ApplyChunk(later, hull, {change.hull, mark, writer, counts.outside});
     const HullRecord& record = change.hull.record;
-    AnswerChunk(later, done, writer.sequence,
-                ChunkResult{state_.catalog.revision(), false, record.revision, record.vertex_count,
-                            counts});
+    AnswerChunk(
+        later, done, writer.sequence,
+        ChunkResult{state_.revision(), false, record.revision, record.vertex_count, counts});
   };
   hull->state.Submit();
   Submit(locked, hull, std::move(built.change), finish);

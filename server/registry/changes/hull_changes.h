@@ -8,9 +8,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
-#include <span>
 #include <string>
-#include <vector>
 
 #include "core/hull/growth/hull_builder.h"
 #include "core/query/placed/live_hull.h"
@@ -27,8 +25,8 @@ namespace hulld::server {
 struct LentBuilder;
 struct PendingChunk;
 
-// Local changes of hulls: creation, deletion, and replacement (hull_lifecycle.cc), and growth by
-// writers' chunks (hull_appender.cc).
+// Local changes of hulls: creation, deletion, and replacement, and growth by writers' chunks
+// (hull_appender.cc).
 //
 // Creation, deletion, and replacement depend on the state of an ID: they load that state, wait
 // until no change of the ID is in flight, and then decide within one hold of the mutex. Chunks
@@ -65,15 +63,16 @@ class HullChanges : public PeerChangeListener {
   // refused. Requires: a valid ID (not checked here; CheckHullId runs when the call arrives).
   // ALREADY_EXISTS; RESOURCE_EXHAUSTED: --max-hulls, or the disk is full; UNAVAILABLE: the store
   // cannot be written.
-  void Create(const std::string& id, bool if_absent, Reply<PutHullResult> done);
+  void Create(const std::string& id, bool if_absent, const Reply<PutHullResult>& done);
   // Removes a hull and notifies its sessions. Replies with the store's revision, as above.
   // NOT_FOUND; ABORTED: if_revision does not match; RESOURCE_EXHAUSTED, UNAVAILABLE: as above.
-  void Delete(const std::string& id, std::optional<uint64_t> if_revision, Reply<uint64_t> done);
+  void Delete(const std::string& id, std::optional<uint64_t> if_revision,
+              const Reply<uint64_t>& done);
   // Replaces a hull atomically for all readers. The result is a new incarnation: sessions of the
   // former one end. Replies as above. Requires a builder. Copies the vertices, so it must not run
   // on a gRPC thread. NOT_FOUND, unless create_if_absent; ABORTED: if_revision does not match;
   // RESOURCE_EXHAUSTED: --max-hulls, or the disk is full; UNAVAILABLE: as above.
-  void Replace(Replacement replacement, Reply<PutHullResult> done);
+  void Replace(Replacement replacement, const Reply<PutHullResult>& done);
 
   // Opens a session; `done` runs on this or another thread. `on_gone` is called at most once, on
   // any thread, with the reason if the hull is deleted or replaced before the session is closed.
@@ -106,17 +105,11 @@ class HullChanges : public PeerChangeListener {
   void Submit(Locked& locked, const HullPointer& hull, Change change, Committer::Completion finish);
   void Advance(Locked& locked, const HullPointer& hull);
 
-  void CreateLocked(Locked& locked, const std::string& id, bool if_absent,
-                    const Reply<PutHullResult>& done);
   void CreateNew(Locked& locked, const std::string& id, const Creation& done);
-  void DeleteLocked(Locked& locked, const std::string& id, std::optional<uint64_t> if_revision,
-                    const Reply<uint64_t>& done);
-  void ReplaceLocked(Locked& locked, const std::shared_ptr<Replacement>& replacement,
-                     const Reply<PutHullResult>& done);
   absl::Status CheckReplacement(const RegisteredHull* former, const Replacement& replacement) const;
   void CommitReplacement(Locked& locked, const HullPointer& former,
                          const std::shared_ptr<Replacement>& replacement,
-                         const Reply<PutHullResult>& done);
+                         const Reply<PutHullResult>& done, const LockedTask& again);
 
   void RunOpen(const std::shared_ptr<OpenRequest>& request);
   void OpenLocked(Locked& locked, const std::shared_ptr<OpenRequest>& request);

@@ -43,8 +43,7 @@ CommitStatistics Committer::Statistics() const {
   return statistics_;
 }
 
-void Committer::AddBarrier(const Locked& locked, Barrier barrier) {
-  HULLD_CHECK(locked.Holds(order_));
+void Committer::AddBarrier(Barrier barrier) {
   {
     const std::lock_guard lock(mutex_);
     barriers_.push_back(std::move(barrier));
@@ -80,14 +79,6 @@ void Committer::StartFetch() {
   {
     const std::lock_guard lock(mutex_);
     is_starting_ = false;
-  }
-  ready_.notify_one();
-}
-
-void Committer::FetchSoon() {
-  {
-    const std::lock_guard lock(mutex_);
-    barriers_.push_back([](Locked&, const absl::Status&) {});
   }
   ready_.notify_one();
 }

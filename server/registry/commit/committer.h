@@ -6,7 +6,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
-#include <memory>
 #include <optional>
 #include <vector>
 
@@ -92,14 +91,12 @@ class Committer {
 
   // Must be called before the first change if the store has a PeerFeed.
   void SetPeers(Peers& peers) { peers_ = &peers; }
-  // Queues a barrier. Requires that `locked` holds `order`. Cost: with peer servers, one store
+  // Queues a barrier. Acquires only the lock of the queue. Cost: with peer servers, one store
   // query, shared by all waiting barriers.
-  void AddBarrier(const Locked& locked, Barrier barrier);
+  void AddBarrier(Barrier barrier);
   // As AddBarrier for a blocking thread: if the committer is idle, the query is sent on this thread
   // when `order` is released, without waiting for the committer's thread to wake up.
   void StartBarrier(Locked& locked, Barrier barrier);
-  // Schedules a query for peer changes. Acquires only the lock of the queue.
-  void FetchSoon();
 
   CommitStatistics Statistics() const;
   // Sets the metrics of batches. Call before the first change; `metrics` must outlive this.

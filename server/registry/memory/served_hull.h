@@ -2,13 +2,11 @@
 #define HULLD_SERVER_REGISTRY_MEMORY_SERVED_HULL_H_
 
 #include <absl/status/status.h>
-#include <absl/status/statusor.h>
 
 #include <atomic>
 #include <cstddef>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <utility>
 
 #include "core/hull/hull.h"

@@ -21,7 +21,7 @@ absl::Status PeerSync::Begin(Locked& locked, std::vector<PeerChangeListener*> li
   absl::Status fetched = feed_.Fetch();
   Apply(locked, feed_.TakeChanges());
   if (fetched.ok()) NoteSynced(asked);
-  feed_.OnPeerCommit([this] { committer_.FetchSoon(); });
+  feed_.OnPeerCommit([this] { committer_.AddBarrier([](Locked&, const absl::Status&) {}); });
   return fetched;
 }
 
@@ -33,31 +33,27 @@ std::optional<nanoseconds> PeerSync::TryFresh(Locked& locked, const Freshness& f
   const nanoseconds staleness = std::max<nanoseconds>(began - *synced_at_, nanoseconds(0));
   if (!freshness.max_staleness.has_value()) return staleness;
   if (staleness > *freshness.max_staleness) return std::nullopt;
-  if (staleness > *freshness.max_staleness / 2) FetchAhead(locked);
+  if (staleness > *freshness.max_staleness / 2) FetchAhead();
   return staleness;
 }
 
-void PeerSync::FetchAhead(Locked& locked) {
+void PeerSync::FetchAhead() {
   if (std::exchange(is_fetching_ahead_, true)) return;
-  committer_.AddBarrier(locked,
-                        [this](Locked&, const absl::Status&) { is_fetching_ahead_ = false; });
+  committer_.AddBarrier([this](Locked&, const absl::Status&) { is_fetching_ahead_ = false; });
 }
 
-bool PeerSync::StartFresh(const Freshness& freshness,
-                          std::function<void(const absl::Status&)> done) {
+void PeerSync::StartFetch(std::function<void(const absl::Status&)> done) {
   Locked locked(state_.mutex);
-  if (TryFresh(locked, freshness).has_value()) return false;
   committer_.StartBarrier(locked,
                           [done = std::move(done)](Locked& later, const absl::Status& status) {
                             later.Afterwards([done, status] { done(status); });
                           });
-  return true;
 }
 
 void PeerSync::WhenFresh(Refusal refuse, LockedTask next) {
   Locked locked(state_.mutex);
-  committer_.AddBarrier(locked, [refuse = std::move(refuse), next = std::move(next)](
-                                    Locked& later, const absl::Status& status) {
+  committer_.AddBarrier([refuse = std::move(refuse), next = std::move(next)](
+                            Locked& later, const absl::Status& status) {
     if (status.ok()) return next(later);
     later.Afterwards([refuse, status] { refuse(status); });
   });
@@ -66,7 +62,7 @@ void PeerSync::WhenFresh(Refusal refuse, LockedTask next) {
 std::vector<HullGrowth> PeerSync::GrownHulls(const PeerChanges& changes) const {
   std::vector<HullGrowth> grown;
   uint64_t points = 0;
-  const HullTable::Entries& all = state_.catalog.hulls().entries();
+  const HullTable::Entries& all = state_.hulls.entries();
   for (const auto& [id, change] : changes.by_id) {
     if (!change.hull.has_value() || !change.hull->ok()) continue;
     const auto found = all.find(id);
@@ -86,19 +82,15 @@ void PeerSync::Apply(Locked& locked, const PeerChanges& changes) {
   in_order.reserve(changes.by_id.size());
   for (const auto& [id, change] : changes.by_id) in_order.emplace_back(change.revision, &id);
   std::ranges::sort(in_order);
-  Catalog& catalog = state_.catalog;
-  const uint64_t since = catalog.revision();
+  const uint64_t since = state_.revision();
   for (const auto& [revision, id] : in_order) {
     const auto hull = state_.ApplyPeerChange(locked, *id, changes.by_id.at(*id), since);
     for (PeerChangeListener* const each : listeners_) each->OnPeerChange(locked, *id, hull);
-    catalog.hulls().RestSome();
-    catalog.bodies().DropSome(locked);
+    state_.hulls.RestSome(locked);
+    state_.bodies.DropSome(locked);
   }
-  if (catalog.is_cache() && changes.revision > 0) catalog.SetTotals(changes.totals);
-  if (changes.revision > catalog.revision()) {
-    catalog.Publish(changes.revision);
-    state_.feed.NoteOther(locked, changes.revision);
-  }
+  if (state_.is_cache() && changes.revision > 0) state_.SetTotals(changes.totals);
+  if (changes.revision > state_.revision()) state_.ApplyOther(locked, changes.revision);
   state_.memory.Evict(locked);
   // Tasks deferred by these tasks wait for the next changes.
   for (const LockedTask& task : std::exchange(deferred_, {})) task(locked);

@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
-#include <memory>
 #include <optional>
 #include <vector>
 
@@ -41,11 +40,10 @@ class PeerSync : public ReadBarrier, public Committer::Peers {
   absl::Status AwaitPeers(Locked& locked, const std::function<bool()>& should_stop) override {
     return AwaitCommits(locked, should_stop);
   }
-  // If the catalog will soon be too stale, fetches ahead, so that later reads need not wait.
+  // If the registry will soon be too stale, fetches ahead, so that later reads need not wait.
   std::optional<std::chrono::nanoseconds> TryFresh(Locked& locked,
                                                    const Freshness& freshness) override;
-  bool StartFresh(const Freshness& freshness,
-                  std::function<void(const absl::Status&)> done) override;
+  void StartFetch(std::function<void(const absl::Status&)> done) override;
   void WhenFresh(Refusal refuse, LockedTask next) override;
   void Defer(LockedTask task) override { deferred_.push_back(std::move(task)); }
 
@@ -56,7 +54,7 @@ class PeerSync : public ReadBarrier, public Committer::Peers {
   void NoteSynced(SteadyClock::time_point asked) override { synced_at_ = asked; }
 
  private:
-  void FetchAhead(Locked& locked);
+  void FetchAhead();
 
   PeerFeed& feed_;
   std::vector<PeerChangeListener*> listeners_;

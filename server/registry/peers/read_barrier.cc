@@ -58,7 +58,7 @@ std::optional<nanoseconds> ReadBarrier::TryFresh(const Freshness& freshness) {
 }
 
 std::optional<nanoseconds> ReadBarrier::TryFresh(Locked& /*locked*/, const Freshness& freshness) {
-  if (state_.catalog.revision() < freshness.at_least_revision) return std::nullopt;
+  if (state_.revision() < freshness.at_least_revision) return std::nullopt;
   return nanoseconds(0);
 }
 
@@ -73,7 +73,7 @@ absl::StatusOr<nanoseconds> ReadBarrier::AwaitFresh(Locked& locked, const Freshn
                                                     const std::function<bool()>& should_stop) {
   if (const auto staleness = TryFresh(locked, freshness)) return *staleness;
   if (absl::Status s = AwaitPeers(locked, should_stop); !s.ok()) return s;
-  const uint64_t revision = state_.catalog.revision();
+  const uint64_t revision = state_.revision();
   if (revision >= freshness.at_least_revision) return nanoseconds(0);
   return FutureRevision(freshness.at_least_revision, revision);
 }

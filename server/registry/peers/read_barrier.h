@@ -6,7 +6,6 @@
 
 #include <chrono>
 #include <functional>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -26,8 +25,8 @@ class PeerChangeListener {
   virtual void OnPeerChange(Locked& locked, const std::string& id, const HullPointer& hull) = 0;
 };
 
-// Blocks calls until the catalog satisfies their freshness. This class is the barrier of a store
-// without peer servers, whose catalog is always current; PeerSync overrides it.
+// Blocks calls until the registry satisfies their freshness. This class is the barrier of a store
+// without peer servers, which is always current; PeerSync overrides it.
 //
 // Functions with a Locked parameter require the registry's mutex; blocking ones release it. The
 // other functions acquire it.
@@ -64,25 +63,21 @@ class ReadBarrier {
     return absl::OkStatus();
   }
 
-  // Returns the bound on staleness if the catalog satisfies `freshness`, else nullopt.
+  // Returns the bound on staleness if the registry satisfies `freshness`, else nullopt.
   std::optional<std::chrono::nanoseconds> TryFresh(const Freshness& freshness);
   virtual std::optional<std::chrono::nanoseconds> TryFresh(Locked& locked,
                                                            const Freshness& freshness);
   // Blocks until TryFresh succeeds and returns its result. FAILED_PRECONDITION: the store has not
-  // assigned that revision. Other errors as AwaitPeers. Cost: a store query only if the catalog is
+  // assigned that revision. Other errors as AwaitPeers. Cost: a store query only if the registry is
   // too stale.
   absl::StatusOr<std::chrono::nanoseconds> AwaitFresh(const Freshness& freshness,
                                                       const std::function<bool()>& should_stop);
   absl::StatusOr<std::chrono::nanoseconds> AwaitFresh(Locked& locked, const Freshness& freshness,
                                                       const std::function<bool()>& should_stop);
-  // If the catalog is too stale for `freshness`, requests the changes committed by peer servers so
-  // far and calls `done` exactly once after they are applied, on this or another thread, without
-  // holding a lock. Otherwise returns false and does nothing. Errors and cost as AwaitPeers,
+  // Requests the changes committed by peer servers so far and calls `done` exactly once after they
+  // are applied, on this or another thread, without holding a lock. Errors and cost as AwaitPeers,
   // without blocking.
-  virtual bool StartFresh(const Freshness& /*freshness*/,
-                          std::function<void(const absl::Status&)> /*done*/) {
-    return false;
-  }
+  virtual void StartFetch(std::function<void(const absl::Status&)> done) { done(absl::OkStatus()); }
   // Runs `next`, which determines the answer to a call, after the changes committed by peer servers
   // so far are applied; or calls `refuse` with the error, without holding a lock.
   virtual void WhenFresh(Refusal refuse, LockedTask next);

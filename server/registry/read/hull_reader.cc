@@ -14,22 +14,12 @@
 
 namespace hulld::server {
 
-namespace {
-
-// Status of a lookup that would have to wait, but may not. It has no message, to avoid an
-// allocation.
-absl::Status WouldWait() { return absl::Status(absl::StatusCode::kUnavailable, ""); }
-
-}  // namespace
-
 // A read of several hulls.
 struct HullReader::HullsRead {
   std::span<const std::string> ids;
   KnownHulls& known;
   const std::function<bool()>& should_stop;
   const ReadPlan& plan;
-  // True if it may release the mutex to read from the store and to prepare.
-  bool may_wait = true;
 };
 
 // Updates the views of all due hulls. Releases the mutex after a number of lookups, and, if
@@ -54,7 +44,7 @@ size_t HullReader::FindAhead(const HullsRead& read) {
   KnownHulls& known = read.known;
   const size_t count = std::min(kFoundAhead, known.due_.size());
   const std::span<const uint32_t> next = std::span(known.due_).last(count);
-  HullTable& hulls = state_.catalog.hulls();
+  HullTable& hulls = state_.hulls;
   for (const uint32_t k : next) hulls.Prefetch(read.ids[known.hulls_[k].first]);
   for (const uint32_t k : next) {
     HullPointer& found = known.hulls_[k].found;
@@ -73,17 +63,17 @@ size_t HullReader::FindAhead(const HullsRead& read) {
 
 absl::Status HullReader::LookUpAll(Locked& locked, const HullsRead& read) {
   KnownHulls& known = read.known;
-  if (!known.next_change_.has_value()) known.next_change_ = state_.catalog.recent_changes().end();
+  if (!known.next_change_.has_value()) known.next_change_ = state_.recent_changes.end();
   size_t left_to_find = known.due_.size();
   while (true) {
     uint64_t& next = *known.next_change_;
-    if (!state_.catalog.recent_changes().Knows(next)) {
-      next = state_.catalog.recent_changes().end();
+    if (!state_.recent_changes.Knows(next)) {
+      next = state_.recent_changes.end();
       locked.Unlock();
       known.ForgetAll();
       locked.Lock();
-    } else if (next < state_.catalog.recent_changes().end()) {
-      known.NoteChange(state_.catalog.recent_changes().at(next++));
+    } else if (next < state_.recent_changes.end()) {
+      known.NoteChange(state_.recent_changes.at(next++));
     } else if (!known.due_.empty()) {
       if (known.due_.size() <= left_to_find) left_to_find = FindAhead(read);
       KnownHulls::Known& due = known.hulls_[known.due_.back()];
@@ -127,17 +117,15 @@ absl::Status HullReader::LookUp(Locked& locked, const HullsRead& read, uint32_t 
   bool was_missing = false;
   while (true) {
     std::optional<HullPointer> found = std::exchange(known.found, nullptr);
-    if (*found == nullptr || (*found)->state.gone()) found = state_.catalog.hulls().Ask(id);
-    if (!found.has_value() && !state_.catalog.bodies().contains(id)) {
-      if (!read.may_wait) return WouldWait();
-      const absl::StatusOr<bool> is_over = AwaitRecord(locked, read, k);
-      if (!is_over.ok()) return is_over.status();
-      if (*is_over) return absl::OkStatus();
+    if (*found == nullptr || (*found)->state.gone()) found = state_.hulls.Ask(id);
+    if (!found.has_value() && !state_.bodies.contains(id)) {
+      if (!plan.may_wait) return WouldWait();
+      if (absl::Status s = AwaitRecord(locked, read, k); !s.ok()) return NoteFailure(s, known);
       continue;
     }
     const HullPointer hull = std::move(found).value_or(nullptr);
     if (hull == nullptr || !hull->state.visible()) {
-      known.view = state_.catalog.NoSuchHull(id);
+      known.view = state_.NoSuchHull(id);
       return absl::OkStatus();
     }
     if (hull->state.damaged()) {
@@ -148,36 +136,44 @@ absl::Status HullReader::LookUp(Locked& locked, const HullsRead& read, uint32_t 
       // The hull was looked up, prepared, and evicted since. Loading and preparing it again could
       // evict another hull of the same read, and so on indefinitely.
       if (IsHeld(known, *hull)) {
-        ++state_.catalog.statistics().hits;
+        ++state_.statistics.hits;
         return absl::OkStatus();
       }
-      if (!read.may_wait) return WouldWait();
-      const absl::StatusOr<bool> is_over = AwaitPoints(locked, read, k, *hull, was_missing);
-      if (!is_over.ok()) return is_over.status();
-      if (*is_over) return absl::OkStatus();
+      if (!plan.may_wait) return WouldWait();
+      if (absl::Status s = CheckReaders(locked, read.known); !s.ok()) return s;
+      const absl::Status loaded = AwaitPoints(locked, read, k, *hull, was_missing);
+      if (!loaded.ok()) return NoteFailure(loaded, known);
       continue;
     }
-    const bool prepare = Preparer::IsWanted(*hull, plan.expected_questions);
+    const bool prepare = hull->WantsPreparing(plan.expected_questions);
     if (prepare && plan.prepare_first) {
-      if (!read.may_wait) return WouldWait();
+      if (!plan.may_wait) return WouldWait();
       if (!std::exchange(known.is_prepared, true)) {
         if (absl::Status s = PrepareFirst(locked, read, *hull); !s.ok()) return s;
         continue;
       }
     }
-    if (prepare) state_.preparer.Schedule(hull);
+    if (prepare) state_.SchedulePreparing(hull);
     NoteView(locked, hull, read.known, k, was_missing);
     return absl::OkStatus();
   }
 }
 
-// Loads the records of this hull and of some hulls due next. Returns false if the caller must look
-// the hull up again, true if the read failed, which is recorded. Releases the mutex.
-absl::StatusOr<bool> HullReader::AwaitRecord(Locked& locked, const HullsRead& read, uint32_t k) {
+// Records that a hull could not be read; the lookup of the other hulls goes on unless it is
+// cancelled.
+absl::Status HullReader::NoteFailure(const absl::Status& status, KnownHulls::Known& known) {
+  if (absl::IsCancelled(status)) return status;
+  known.view = status;
+  return absl::OkStatus();
+}
+
+// Loads the records of this hull and of some hulls due next. The caller must look the hull up again
+// unless the read failed. Releases the mutex.
+absl::Status HullReader::AwaitRecord(Locked& locked, const HullsRead& read, uint32_t k) {
   KnownHulls& hulls = read.known;
   if (!hulls.ahead_.empty()) {
     EndAllLoading(locked, read);
-    return false;
+    return absl::OkStatus();
   }
   std::vector<const std::string*> wanted = {&read.ids[hulls.hulls_[k].first]};
   const size_t count = std::min<size_t>(hulls.due_.size(), kMaxLookupsPerHold - 1);
@@ -185,42 +181,33 @@ absl::StatusOr<bool> HullReader::AwaitRecord(Locked& locked, const HullsRead& re
     if (due != k) wanted.push_back(&read.ids[hulls.hulls_[due].first]);
   }
   const absl::Status asked = records_.AwaitKnown(locked, wanted, read.should_stop);
-  if (Stopped(read.should_stop)) return Cancelled();
-  if (asked.ok()) return false;
-  hulls.hulls_[k].view = asked;
-  return true;
+  return Stopped(read.should_stop) ? Cancelled() : asked;
 }
 
-// Loads the points of this hull, and at first of the hulls due next. Returns false if the caller
-// must look the hull up again, true if the read failed, which is recorded. Releases the mutex.
-absl::StatusOr<bool> HullReader::AwaitPoints(Locked& locked, const HullsRead& read, uint32_t k,
-                                             RegisteredHull& hull, bool& was_missing) {
-  KnownHulls& hulls = read.known;
-  if (absl::Status s = CheckReaders(locked, hulls); !s.ok()) return s;
+// Loads the points of this hull, and at first of the hulls due next. As AwaitRecord otherwise.
+absl::Status HullReader::AwaitPoints(Locked& locked, const HullsRead& read, uint32_t k,
+                                     RegisteredHull& hull, bool& was_missing) {
+  absl::Status loaded;
   if (!std::exchange(was_missing, true)) {
-    ++state_.catalog.statistics().misses;
+    ++state_.statistics.misses;
     LoadMany(locked, read, k);
-    if (Stopped(read.should_stop)) return Cancelled();
-    return false;
-  }
-  if (!hulls.ahead_.empty()) {
+  } else if (!read.known.ahead_.empty()) {
     EndAllLoading(locked, read);
-    return false;
+    return absl::OkStatus();
+  } else {
+    loaded = LoadOne(locked, hull, read.should_stop);
   }
-  const absl::Status loaded = LoadOne(locked, hull, read.should_stop);
-  if (Stopped(read.should_stop) || absl::IsCancelled(loaded)) return Cancelled();
-  if (loaded.ok() || hull.state.gone()) return false;
-  hulls.hulls_[k].view = loaded;
-  return true;
+  if (Stopped(read.should_stop)) return Cancelled();
+  return hull.state.gone() ? absl::OkStatus() : loaded;
 }
 
 // Prepares the hull before its first query. Releases the mutex.
 absl::Status HullReader::PrepareFirst(Locked& locked, const HullsRead& read, RegisteredHull& hull) {
   if (!read.known.ahead_.empty()) {
     EndAllLoading(locked, read);
-    if (!Preparer::IsWanted(hull, read.plan.expected_questions)) return absl::OkStatus();
+    if (!hull.WantsPreparing(read.plan.expected_questions)) return absl::OkStatus();
   }
-  state_.preparer.Prepare(locked, hull);
+  state_.Prepare(locked, hull);
   return Stopped(read.should_stop) ? Cancelled() : absl::OkStatus();
 }
 
@@ -234,15 +221,14 @@ void HullReader::NoteView(Locked& locked, const HullPointer& hull, KnownHulls& h
                           bool was_missing) {
   KnownHulls::Known& known = hulls.hulls_[k];
   const bool was_loaded = std::exchange(known.is_loaded, false);
-  if (!was_missing)
-    ++(was_loaded ? state_.catalog.statistics().misses : state_.catalog.statistics().hits);
+  if (!was_missing) ++(was_loaded ? state_.statistics.misses : state_.statistics.hits);
   known.view = HullView{hull->committed().record, hull->Serve()};
   known.bytes = hull->shared_bytes();
   // Serve counted its parts.
   hull->NoteRead();
   if (was_missing || was_loaded) {
     state_.memory.Evict(locked);
-    state_.catalog.hulls().RestSome();
+    state_.hulls.RestSome(locked);
   }
 }
 
@@ -280,7 +266,7 @@ bool HullReader::BeginLoading(Locked& locked, const HullsRead& read) {
     locked.NoteLookup();
     const KnownHulls::Known& known = hulls.hulls_[k];
     const std::string& id = read.ids[known.first];
-    const HullPointer hull = state_.catalog.IsKnown(id) ? state_.catalog.FindVisible(id) : nullptr;
+    const HullPointer hull = state_.IsKnown(id) ? state_.FindVisible(id) : nullptr;
     if (hull == nullptr || hull->state.damaged() || hull->IsReady() || hull->is_loading() ||
         hull->state.life() == HullState::Life::kEnding || IsHeld(known, *hull)) {
       --end;
@@ -322,7 +308,7 @@ void HullReader::EndLoading(Locked& locked, const HullsRead& read) {
     const bool is_current = hull.committed().record.revision == revision;
     if (!loaded[i].ok() || !is_current || hull.live() != nullptr || hull.state.gone()) continue;
     hull.SetLive(*std::move(loaded[i]));
-    ++state_.catalog.statistics().loads;
+    ++state_.statistics.loads;
     hull.NoteUse();
     known.is_loaded = true;
     known.found = loading.found[i];
@@ -341,31 +327,17 @@ absl::StatusOr<Resolved> HullReader::Refresh(std::span<const std::string> ids, K
   Resolved resolved;
   {
     Locked locked(state_.mutex);
-    const auto staleness = barrier_.AwaitFresh(locked, plan.freshness, should_stop);
+    absl::StatusOr<std::chrono::nanoseconds> staleness = WouldWait();
+    if (const auto known_staleness = barrier_.TryFresh(locked, plan.freshness)) {
+      staleness = *known_staleness;
+    } else if (plan.may_wait) {
+      staleness = barrier_.AwaitFresh(locked, plan.freshness, should_stop);
+    }
     if (!staleness.ok()) return staleness.status();
     resolved.as_of.staleness = *staleness;
     if (absl::Status s = LookUpDue(locked, {ids, known, should_stop, plan}); !s.ok()) return s;
-    resolved.as_of.revision = state_.catalog.revision();
-    state_.memory.Evict(locked);
-  }
-  resolved.hulls = known.Views(ids);
-  return resolved;
-}
-
-std::optional<Resolved> HullReader::TryResolve(std::span<const std::string> ids,
-                                               const ReadPlan& plan) {
-  KnownHulls known = KnownHulls::ForOneLookup();
-  known.Begin(ids);
-  const std::function<bool()> should_stop;
-  Resolved resolved;
-  {
-    Locked locked(state_.mutex);
-    const auto staleness = barrier_.TryFresh(locked, plan.freshness);
-    if (!staleness.has_value()) return std::nullopt;
-    resolved.as_of.staleness = *staleness;
-    // Refresh reports the error, unless it no longer occurs when it runs.
-    if (!LookUpDue(locked, {ids, known, should_stop, plan, false}).ok()) return std::nullopt;
-    resolved.as_of.revision = state_.catalog.revision();
+    resolved.as_of.revision = state_.revision();
+    if (plan.may_wait) state_.memory.Evict(locked);
   }
   resolved.hulls = known.Views(ids);
   return resolved;
@@ -387,10 +359,10 @@ absl::StatusOr<const Hull*> HullReader::Canonical(const HullView& view,
   Locked locked(state_.mutex);
   const std::string& id = view.record.hull_id;
   // An unknown hull has no state to update.
-  const HullPointer hull = state_.catalog.IsKnown(id) ? state_.catalog.FindVisible(id) : nullptr;
+  const HullPointer hull = state_.IsKnown(id) ? state_.FindVisible(id) : nullptr;
   const bool is_current =
       hull != nullptr && hull->committed().record.revision == view.record.revision;
-  if (is_current && absl::IsDataLoss(status)) state_.catalog.MarkDamaged(*hull, status);
+  if (is_current && absl::IsDataLoss(status)) state_.MarkDamaged(*hull, status);
   if (is_current) hull->NoteUse();
   state_.memory.Evict(locked);
   if (!status.ok()) return status;
@@ -437,7 +409,7 @@ absl::Status HullReader::LoadOne(Locked& locked, RegisteredHull& hull,
     }
     if (loaded.ok()) {
       hull.SetLive(*std::move(loaded));
-      ++state_.catalog.statistics().loads;
+      ++state_.statistics.loads;
       hull.NoteUse();
       return absl::OkStatus();
     }
@@ -445,7 +417,7 @@ absl::Status HullReader::LoadOne(Locked& locked, RegisteredHull& hull,
     // they are damaged.
     failed = true;
     if (hull.state.life() == HullState::Life::kEnding) continue;
-    if (absl::IsDataLoss(loaded.status())) state_.catalog.MarkDamaged(hull, loaded.status());
+    if (absl::IsDataLoss(loaded.status())) state_.MarkDamaged(hull, loaded.status());
     return loaded.status();
   }
   return absl::OkStatus();

@@ -6,8 +6,6 @@
 
 #include <cstdint>
 #include <functional>
-#include <memory>
-#include <optional>
 #include <span>
 #include <string>
 
@@ -50,9 +48,6 @@ class HullReader {
   absl::StatusOr<Resolved> Refresh(std::span<const std::string> ids, KnownHulls& known,
                                    const std::function<bool()>& should_stop,
                                    const ReadPlan& plan = {});
-  // As Registry::Resolve, but returns nullopt without blocking if it would have to query or read
-  // the store, or to prepare a hull.
-  std::optional<Resolved> TryResolve(std::span<const std::string> ids, const ReadPlan& plan = {});
   // Returns the canonical snapshot of a resolved hull, built at first use; it lives as long as
   // view.served. Not for gRPC threads. DATA_LOSS: the store is damaged. CANCELLED: should_stop
   // returned true. RESOURCE_EXHAUSTED: it is not built yet, and readers exceed their share of
@@ -71,9 +66,10 @@ class HullReader {
   absl::Status LookUpAll(Locked& locked, const HullsRead& read);
   size_t FindAhead(const HullsRead& read);
   absl::Status LookUp(Locked& locked, const HullsRead& read, uint32_t k);
-  absl::StatusOr<bool> AwaitRecord(Locked& locked, const HullsRead& read, uint32_t k);
-  absl::StatusOr<bool> AwaitPoints(Locked& locked, const HullsRead& read, uint32_t k,
-                                   RegisteredHull& hull, bool& was_missing);
+  static absl::Status NoteFailure(const absl::Status& status, KnownHulls::Known& known);
+  absl::Status AwaitRecord(Locked& locked, const HullsRead& read, uint32_t k);
+  absl::Status AwaitPoints(Locked& locked, const HullsRead& read, uint32_t k, RegisteredHull& hull,
+                           bool& was_missing);
   absl::Status PrepareFirst(Locked& locked, const HullsRead& read, RegisteredHull& hull);
   static bool IsHeld(const KnownHulls::Known& known, const RegisteredHull& hull);
   void NoteView(Locked& locked, const HullPointer& hull, KnownHulls& hulls, uint32_t k,

@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <cstdint>
 #include <memory>
-#include <mutex>
-#include <optional>
 #include <span>
 #include <utility>
 
@@ -38,7 +36,7 @@ absl::Status IsAhead(uint64_t found, uint64_t known) {
 
 void RecordReader::WhenKnown(Locked& locked, const std::string& id, Refusal refuse,
                              LockedTask next) {
-  HULLD_CHECK(locked.Holds(state_.mutex) && !state_.catalog.IsKnown(id));
+  HULLD_CHECK(locked.Holds(state_.mutex) && !state_.IsKnown(id));
   std::shared_ptr<Reading>& reading = readings_[id];
   const bool is_new = reading == nullptr;
   if (is_new) {
@@ -53,18 +51,29 @@ void RecordReader::WhenKnown(Locked& locked, const std::string& id, Refusal refu
   loaders_.Submit([this] { ReadDue(); }, kRecordReader);
 }
 
+void RecordReader::WhenReady(const std::string& id, For need, Refusal refuse, Task task) {
+  const auto ready =
+      std::make_shared<const ReadyTask>(ReadyTask{id, need, std::move(refuse), std::move(task)});
+  barrier_.WhenFresh(ready->refuse, [this, ready](Locked& locked) { RunWhenReady(locked, ready); });
+}
+
+void RecordReader::RunWhenReady(Locked& locked, const std::shared_ptr<const ReadyTask>& ready) {
+  const LockedTask again = [this, ready](Locked& later) { RunWhenReady(later, ready); };
+  if (MustWait(locked, ready->id, ready->need, ready->refuse, again)) return;
+  ready->task(locked, again);
+}
+
 bool RecordReader::MustWait(Locked& locked, const std::string& id, For need, const Refusal& refuse,
                             LockedTask next) {
-  Catalog& catalog = state_.catalog;
-  if (!catalog.IsKnown(id)) {
+  if (!state_.IsKnown(id)) {
     WhenKnown(locked, id, refuse, std::move(next));
     return true;
   }
-  if (BodyTable::Entry* const body = catalog.BodyInFlight(id); body != nullptr) {
+  if (BodyTable::Entry* const body = state_.bodies.Find(id); body != nullptr && body->in_flight) {
     body->waiting.push_back(std::move(next));
     return true;
   }
-  const HullPointer hull = catalog.Find(id);
+  const HullPointer hull = state_.Find(id);
   if (hull == nullptr) return false;
   const HullState& state = hull->state;
   const bool waits = need == For::kQuiet ? !state.quiet() : state.changing_life();
@@ -99,7 +108,7 @@ absl::Status RecordReader::AwaitKnown(Locked& locked, std::span<const std::strin
   std::shared_ptr<Reading> awaited;
   for (const std::string* const id : ids) {
     locked.NoteLookup();
-    if (state_.catalog.IsKnown(*id)) {
+    if (state_.IsKnown(*id)) {
       if (awaited == nullptr) return absl::OkStatus();
       continue;
     }
@@ -125,7 +134,7 @@ absl::Status RecordReader::AwaitMissing(Locked& locked, std::span<const std::str
   if (absl::Status s = state_.memory.Check(locked, MemoryUse::kReading); !s.ok()) return s;
   std::vector<const std::string*> missing;
   for (const std::string& id : ids) {
-    if (!state_.catalog.IsKnown(id)) missing.push_back(&id);
+    if (!state_.IsKnown(id)) missing.push_back(&id);
   }
   const absl::Status read = AwaitKnown(locked, missing, should_stop);
   if (Stopped(should_stop)) return Cancelled();
@@ -137,7 +146,7 @@ void RecordReader::ReadRecords(Locked& locked, const Readings& readings) {
   std::vector<std::string> ids;
   ids.reserve(readings.size());
   for (const auto& reading : readings) ids.push_back(reading->id);
-  const uint64_t asked_at = state_.catalog.revision();
+  const uint64_t asked_at = state_.revision();
   locked.Unlock();
   absl::StatusOr<FoundRecords> found = state_.store.FindRecords(ids);
   locked.Lock();
@@ -149,9 +158,9 @@ void RecordReader::ReadRecords(Locked& locked, const Readings& readings) {
 
 void RecordReader::TakeRecords(Locked& locked, const Readings& readings,
                                const absl::StatusOr<FoundRecords>& found) {
-  // Evicts first, so that the new records are still in the catalog when their callers resume.
-  for (size_t i = 0; i < readings.size(); ++i) state_.catalog.hulls().RestSome();
-  state_.catalog.bodies().DropSome(locked);
+  // Evicts first, so that the new records are still known when their callers resume.
+  for (size_t i = 0; i < readings.size(); ++i) state_.hulls.RestSome(locked);
+  state_.bodies.DropSome(locked);
   Readings open;
   for (const auto& reading : readings) {
     if (reading->is_over) continue;
@@ -162,15 +171,15 @@ void RecordReader::TakeRecords(Locked& locked, const Readings& readings,
 }
 
 void RecordReader::TakeRecord(Locked& locked, const std::string& id, const FoundRecords& found) {
-  HULLD_CHECK(!state_.catalog.IsKnown(id));
+  HULLD_CHECK(!state_.IsKnown(id));
   const auto hull = found.hulls.find(id);
   const auto body = found.bodies.find(id);
   const bool has_hull = hull != found.hulls.end();
   const bool has_body = body != found.bodies.end();
-  if (!has_hull && !has_body) return state_.catalog.hulls().NoteAbsent(id);
-  if (!has_hull) return state_.catalog.AddBody(locked, id, body->second);
-  if (has_body) Catalog::LogBodyUnderHull(id);
-  state_.catalog.AddStored(id, hull->second);
+  if (!has_hull && !has_body) return state_.hulls.NoteAbsent(id);
+  if (!has_hull) return state_.AddBody(locked, id, body->second);
+  if (has_body) RegistryState::LogBodyUnderHull(id);
+  state_.AddStored(id, hull->second);
 }
 
 void RecordReader::EndReading(Locked& locked, Reading& reading, const absl::Status& status) {
@@ -192,7 +201,7 @@ void RecordReader::OnPeerChange(Locked& /*locked*/, const std::string& id,
   const auto found = readings_.find(id);
   if (found == readings_.end()) return;
   const std::shared_ptr<Reading> reading = found->second;
-  if (!state_.catalog.IsKnown(id)) state_.catalog.hulls().NoteAbsent(id);
+  if (!state_.IsKnown(id)) state_.hulls.NoteAbsent(id);
   reading->is_over = true;
   reading->over.notify_all();
   readings_.erase(found);
@@ -203,11 +212,11 @@ void RecordReader::WhenReached(Locked& locked, uint64_t asked_at,
                                absl::StatusOr<FoundRecords> found, FoundTaker take) {
   if (found.ok() && found->revision < asked_at) found = WentBack(found->revision, asked_at);
   if (!found.ok() || !IsBehind(*found, nullptr)) return take(locked, found);
-  // After this round of the committer, the catalog includes everything that the store contained.
+  // After this round of the committer, the registry includes everything that the store contained.
   const auto kept = std::make_shared<const FoundRecords>(*std::move(found));
   committer_.AddBarrier(
-      locked, [this, kept, take = std::move(take)](Locked& later, const absl::Status& status) {
-        const uint64_t known = state_.catalog.revision();
+      [this, kept, take = std::move(take)](Locked& later, const absl::Status& status) {
+        const uint64_t known = state_.revision();
         if (!status.ok()) return take(later, status);
         if (kept->revision > known) return take(later, IsAhead(kept->revision, known));
         take(later, *kept);
@@ -222,25 +231,25 @@ absl::StatusOr<FoundRecords> RecordReader::AwaitReached(uint64_t asked_at,
   Locked locked(state_.mutex);
   if (!IsBehind(*found, &locked)) return found;
   if (absl::Status s = barrier_.AwaitCommits(locked, should_stop); !s.ok()) return s;
-  const uint64_t known = state_.catalog.revision();
+  const uint64_t known = state_.revision();
   if (found->revision > known) return IsAhead(found->revision, known);
   return found;
 }
 
-// Returns true if the store has a later state of the hull than the catalog, at the same revision:
+// Returns true if the store has a later state of the hull than the registry, at the same revision:
 // points that change no vertex do not create a revision.
 bool RecordReader::IsBehind(const std::string& id, const absl::StatusOr<StoredHull>& stored) const {
   if (!stored.ok()) return false;
-  const HullTable::Entries& all = state_.catalog.hulls().entries();
+  const HullTable::Entries& all = state_.hulls.entries();
   const auto known = all.find(id);
   if (known == all.end() || known->second.revision() != stored->record.revision) return false;
   return known->second.Describe(id).record.counts.received < stored->record.counts.received;
 }
 
-// Returns true if the records are newer than the catalog: committed, perhaps by a peer server, but
-// not yet applied. An answer from them would be followed by an older one from the catalog.
+// Returns true if the records are newer than the registry: committed, perhaps by a peer server, but
+// not yet applied. An answer from them would be followed by an older one from memory.
 bool RecordReader::IsBehind(const FoundRecords& found, Locked* yields) const {
-  if (found.revision > state_.catalog.revision()) return true;
+  if (found.revision > state_.revision()) return true;
   return std::ranges::any_of(found.hulls, [&](const auto& hull) {
     if (yields != nullptr) yields->NoteLookupMaybeYield();
     return IsBehind(hull.first, hull.second);
@@ -252,8 +261,8 @@ absl::StatusOr<RecordPage> RecordReader::List(const PageRequest& request,
   uint64_t asked_at = 0;
   {
     Locked locked(state_.mutex);
-    if (!state_.catalog.is_cache()) return CataloguedPage(request);
-    asked_at = state_.catalog.revision();
+    if (!state_.is_cache()) return CataloguedPage(request);
+    asked_at = state_.revision();
     const absl::Status memory =
         request.kinds.bodies ? state_.memory.Check(locked, MemoryUse::kReading) : absl::OkStatus();
     if (!memory.ok()) return memory;
@@ -267,7 +276,7 @@ absl::StatusOr<RecordPage> RecordReader::List(const PageRequest& request,
   return Describe(*found, &locked);
 }
 
-// The catalog may know more about this version than its record: its box, or its damage.
+// The registry may know more about this version than its record: its box, or its damage.
 HullChange RecordReader::Describe(const std::string& id,
                                   const absl::StatusOr<StoredHull>& stored) const {
   HullChange change;
@@ -277,7 +286,7 @@ HullChange RecordReader::Describe(const std::string& id,
   } else {
     change.record.hull_id = id;
   }
-  const HullTable::Entries& all = state_.catalog.hulls().entries();
+  const HullTable::Entries& all = state_.hulls.entries();
   const auto known = all.find(id);
   if (known == all.end() || !known->second.visible()) return change;
   HullChange described = known->second.Describe(id);
@@ -309,11 +318,11 @@ RecordPage RecordReader::CataloguedPage(const PageRequest& request) const {
   const auto begin_of = [&](const auto& entries) {
     return request.after.empty() ? entries.lower_bound(first) : entries.upper_bound(request.after);
   };
-  const auto& hulls = state_.catalog.hulls().entries();
-  const auto& bodies = state_.catalog.bodies().entries();
+  const auto& hulls = state_.hulls.entries();
+  const auto& bodies = state_.bodies.entries();
   auto hull = request.kinds.hulls ? begin_of(hulls) : hulls.end();
   auto body = request.kinds.bodies ? begin_of(bodies) : bodies.end();
-  RecordPage page = {.store_revision = state_.catalog.revision()};
+  RecordPage page = {.store_revision = state_.revision()};
   while (true) {
     const bool has_hull = has_next(hulls, hull);
     const bool has_body = has_next(bodies, body);
@@ -337,10 +346,10 @@ RecordPage RecordReader::CataloguedPage(const PageRequest& request) const {
 void RecordReader::ReadPage(Locked& locked, PageRequest request,
                             std::function<void(Locked&, absl::StatusOr<RecordPage>)> done) {
   HULLD_CHECK(locked.Holds(state_.mutex));
-  if (!state_.catalog.is_cache()) return done(locked, CataloguedPage(request));
+  if (!state_.is_cache()) return done(locked, CataloguedPage(request));
   loaders_.Submit(
       [this, request = std::move(request), done = std::move(done),
-       asked_at = state_.catalog.revision()]() mutable {
+       asked_at = state_.revision()]() mutable {
         absl::StatusOr<FoundRecords> found =
             request.ids.empty() ? state_.store.ListRecords(request.prefix, request.after,
                                                            request.page_size, request.kinds)

@@ -20,7 +20,7 @@
 #include "server/registry/memory/locked.h"
 #include "server/registry/peers/read_barrier.h"
 #include "server/registry/state/registry_state.h"
-#include "server/registry/watch/page_source.h"
+#include "server/registry/watch/change_watch.h"
 #include "server/store/store.h"
 
 namespace hulld::server {
@@ -30,18 +30,18 @@ namespace hulld::server {
 inline constexpr ClientId kRecordReader = {1};
 inline constexpr ClientId kWatchReader = {2};
 
-// Reads records from a store that finds records, only some of which are in the catalog: loads the
-// record of an ID into the catalog (of the hull or of the body, or the absence of both), and lists
-// records page by page without adding them to the catalog.
+// Reads records from a store that finds records, only some of which are in memory: loads the
+// record of an ID into the tables (of the hull or of the body, or the absence of both), and lists
+// records page by page without adding them to the tables.
 //
 // Invariants:
 //   - At most one thread reads the record of an ID, however many callers wait for it.
 //   - Only unknown IDs are read, so no local change interferes: local changes require known IDs.
 //     A change by a peer server replaces the read in progress (OnPeerChange).
-//   - When the waiting callers resume, the record is in the catalog, or was there and has been
+//   - When the waiting callers resume, the record is in memory, or was there and has been
 //     evicted again.
 //     A caller therefore looks the ID up again, and may find it unknown once more.
-//   - Records are used only after the catalog has reached their revision. The store may be at a
+//   - Records are used only after the registry has reached their revision. The store may be at a
 //     later one; the changes in between, of peer servers or local ones, are then applied first. An
 //     answer mixing both revisions would be inconsistent, and a caller that saw the later one could
 //     be answered from the earlier one next.
@@ -63,6 +63,10 @@ class RecordReader : public PeerChangeListener, public PageSource {
   // State of an ID that a task requires. kLife: known, with no change of a body and no creation or
   // end of a hull in flight. kQuiet: known, with nothing in flight.
   enum class For { kLife, kQuiet };
+  // Runs `task` when the changes committed by peer servers so far are applied and the ID is in that
+  // state; or refuses, without the mutex. The task may run again by `again`, which waits likewise.
+  using Task = std::function<void(Locked& locked, const LockedTask& again)>;
+  void WhenReady(const std::string& id, For need, Refusal refuse, Task task);
   // Returns true if the ID is not in that state; then `next` runs when it may have reached that
   // state, and must check again. Otherwise does nothing. refuse: as WhenKnown.
   bool MustWait(Locked& locked, const std::string& id, For need, const Refusal& refuse,
@@ -98,10 +102,18 @@ class RecordReader : public PeerChangeListener, public PageSource {
     ConditionVariable over;
     std::vector<std::pair<Refusal, LockedTask>> waiting;
   };
+  // Arguments of WhenReady.
+  struct ReadyTask {
+    std::string id;
+    For need;
+    Refusal refuse;
+    Task task;
+  };
   using Readings = std::vector<std::shared_ptr<Reading>>;
   // Called with the registry's mutex held, with the records valid from then on, or an error.
   using FoundTaker = std::function<void(Locked&, const absl::StatusOr<FoundRecords>&)>;
 
+  void RunWhenReady(Locked& locked, const std::shared_ptr<const ReadyTask>& ready);
   void ReadDue();
   void ReadRecords(Locked& locked, const Readings& readings);
   void TakeRecords(Locked& locked, const Readings& readings,
@@ -109,9 +121,9 @@ class RecordReader : public PeerChangeListener, public PageSource {
   void TakeRecord(Locked& locked, const std::string& id, const FoundRecords& found);
   void EndReading(Locked& locked, Reading& reading, const absl::Status& status);
 
-  // Passes `found` to `take`, now or on the committer's thread. asked_at: the catalog's revision at
-  // the time of the store query. UNAVAILABLE: the store went back, or cannot report the changes in
-  // between.
+  // Passes `found` to `take`, now or on the committer's thread. asked_at: the registry's revision
+  // at the time of the store query. UNAVAILABLE: the store went back, or cannot report the changes
+  // in between.
   void WhenReached(Locked& locked, uint64_t asked_at, absl::StatusOr<FoundRecords> found,
                    FoundTaker take);
   // As WhenReached, but blocks. Requires that the thread does not hold the mutex. CANCELLED:

@@ -1,8 +1,15 @@
 #include "server/registry/state/registry_state.h"
 
+#include <absl/strings/str_cat.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <mutex>
 #include <utility>
 
 #include "core/base/check.h"
+#include "server/contract/error_info.h"
+#include "server/contract/limit_error.h"
 #include "server/registry/catalog/registered_hull.h"
 #include "server/settings/resource_limits.h"
 
@@ -19,6 +26,15 @@ uint64_t ReadersShare(uint64_t memory_limit, const Store& store) {
   return memory_limit / (store.keeps_hulls() ? 2 : 4);
 }
 
+// Returns the number of records that fill a sixteenth of the limit, in addition to the memory held
+// for points.
+size_t MaxRecords(uint64_t memory_limit) {
+  return std::max<uint64_t>(1 << 12, memory_limit / 16 / HullTable::kBytesOfRecord);
+}
+
+// Unused bodies may use up to 1/kBodiesShare of the limit.
+constexpr uint64_t kBodiesShare = 16;
+
 }  // namespace
 
 RegistryState::RegistryState(Store& store_in, const Limits& limits_in,
@@ -26,9 +42,146 @@ RegistryState::RegistryState(Store& store_in, const Limits& limits_in,
     : store(store_in),
       limits(WithMemoryLimit(limits_in)),
       memory(limits.memory_limit, ReadersShare(limits.memory_limit, store), mutex),
-      catalog(store, limits, memory),
+      hulls(store.keeps_hulls(), memory),
       feed(store, mutex, memory, Config::kWatchMarkInterval),
-      preparer(mutex, catalog, memory, preparers) {}
+      is_cache_(store.finds_records()),
+      preparer_(std::in_place, 1, preparers) {
+  if (!is_cache_) return;
+  hulls.KeepAtMost(MaxRecords(limits.memory_limit));
+  bodies.KeepAtMost(limits.memory_limit / kBodiesShare);
+}
+
+void RegistryState::Begin(uint64_t revision, PageSource& pages) {
+  HULLD_CHECK(hulls.size() == 0 && revision_ == 0);
+  revision_ = revision;
+  feed.Begin(revision, pages);
+}
+
+void RegistryState::Publish(uint64_t revision) {
+  HULLD_CHECK(revision > revision_);
+  revision_ = revision;
+}
+
+HullPointer RegistryState::Find(const std::string& id) {
+  std::optional<HullPointer> hull = hulls.Ask(id);
+  HULLD_CHECK(hull.has_value() || bodies.contains(id));
+  return std::move(hull).value_or(nullptr);
+}
+
+HullPointer RegistryState::FindVisible(const std::string& id) {
+  HullPointer hull = Find(id);
+  return hull != nullptr && hull->state.visible() ? hull : nullptr;
+}
+
+std::shared_ptr<const Body> RegistryState::FindBody(const std::string& id) {
+  const BodyTable::Entry* const entry = bodies.Find(id);
+  return entry == nullptr ? nullptr : entry->committed();
+}
+
+absl::Status RegistryState::NoSuchHull(const std::string& id) const {
+  if (!bodies.contains(id)) return HullNotFound(id);
+  return WithReason(
+      absl::NotFoundError(absl::StrCat("\"", id, "\" is a body; this call requires a hull")),
+      v1::ERROR_REASON_HULL_NOT_FOUND, {{"hull_id", id}});
+}
+
+void RegistryState::AddStored(const std::string& id, const absl::StatusOr<StoredHull>& stored) {
+  if (stored.ok()) {
+    hulls.AddResting(*stored);
+    if (!is_cache_) NoteVertices(0, stored->record.vertex_count);
+    return;
+  }
+  spdlog::error("{}", std::string(stored.status().message()));
+  StoredHull nothing;
+  nothing.record.hull_id = id;
+  MarkDamaged(*hulls.Insert(nothing, HullState::Present()), stored.status());
+}
+
+void RegistryState::MarkDamaged(RegisteredHull& hull, const absl::Status& damage) {
+  if (hull.state.damaged() || hull.state.life() != HullState::Life::kPresent) return;
+  hull.state.Damage(damage);
+  NoteChange(hull);
+  ++statistics.damaged;
+}
+
+void RegistryState::NoteChange(const RegisteredHull& hull) {
+  recent_changes.Note(hull.committed().record.hull_id);
+}
+
+void RegistryState::Forget(Locked& locked, const HullPointer& hull, const absl::Status& reason) {
+  HULLD_CHECK(hull->state.gone());
+  hulls.Erase(hull);
+  for (auto& [number, on_gone] : hull->watches) {
+    locked.Afterwards([on_gone = std::move(on_gone), reason] { on_gone(reason); });
+  }
+  hull->watches.clear();
+  hull->DiscardAll(locked);
+  hull->account.Close();
+}
+
+void RegistryState::AddStoredBody(Locked& locked, const std::string& id,
+                                  const absl::StatusOr<StoredBody>& stored) {
+  if (hulls.contains(id)) return LogBodyUnderHull(id);
+  AddBody(locked, id, stored);
+  ++kept_bodies_;
+}
+
+void RegistryState::AddBody(Locked& locked, const std::string& id,
+                            const absl::StatusOr<StoredBody>& stored) {
+  if (!stored.ok()) {
+    spdlog::error("{}", std::string(stored.status().message()));
+    ++statistics.damaged;
+  }
+  bodies.Add(id);
+  bodies.Set(locked, id,
+             std::make_shared<const Body>(id, stored, memory,
+                                          is_cache_ ? MemoryUse::kReading : MemoryUse::kWriting));
+  hulls.ForgetAbsent(id);
+}
+
+void RegistryState::LogBodyUnderHull(const std::string& id) {
+  spdlog::error(
+      "the store contains a body under the ID of hull \"{}\"; the body is ignored; delete one of "
+      "the two",
+      id);
+}
+
+void RegistryState::EraseBody(Locked& locked, const std::string& id) {
+  bodies.Erase(locked, id);
+  if (is_cache_) hulls.NoteAbsent(id);
+}
+
+absl::Status RegistryState::CheckHullCount() const {
+  const uint64_t hull_count = HullCount();
+  const uint64_t body_count = BodyCount();
+  if (hull_count + body_count < limits.max_hulls) return absl::OkStatus();
+  std::string held = absl::StrCat("the store contains ", hull_count, " hulls");
+  if (body_count > 0) absl::StrAppend(&held, " and ", body_count, " bodies");
+  return LimitExceeded(held, limits.max_hulls, "max-hulls");
+}
+
+RegistrySizes RegistryState::Sizes() const {
+  return {revision_, HullCount() - creating_hulls_, vertex_count_, kept_bodies_};
+}
+
+void RegistryState::EndCreatingHull(Locked& locked, const HullPointer& hull,
+                                    const absl::Status& status) {
+  --creating_hulls_;
+  if (!status.ok()) return Forget(locked, hull, status);
+  ++kept_hulls_;
+}
+
+void RegistryState::EndCreatingBody(bool is_committed) {
+  --creating_bodies_;
+  if (is_committed) ++kept_bodies_;
+}
+
+void RegistryState::SetTotals(const StoreTotals& totals) {
+  HULLD_CHECK(is_cache_);
+  kept_hulls_ = totals.hulls;
+  vertex_count_ = totals.vertices;
+  kept_bodies_ = totals.bodies;
+}
 
 void RegistryState::ApplyCreation(Locked& locked, const HullPointer& former,
                                   const HullPointer& hull, const StoredHull& stored) {
@@ -38,24 +191,24 @@ void RegistryState::ApplyCreation(Locked& locked, const HullPointer& former,
     const HullRecord& record = former->committed().record;
     replaced = Incarnation::Of(record);
     hull->state.Commit();
-    catalog.NoteVertices(record.vertex_count, 0);
-    catalog.Forget(locked, former, Gone(record.hull_id, "replaced"));
-    catalog.hulls().Insert(hull);
+    NoteVertices(record.vertex_count, 0);
+    Forget(locked, former, Gone(record.hull_id, "replaced"));
+    hulls.Insert(hull);
   }
-  catalog.NoteVertices(0, stored.record.vertex_count);
-  catalog.Publish(stored.record.revision);
-  catalog.NoteChange(*hull);
+  NoteVertices(0, stored.record.vertex_count);
+  Publish(stored.record.revision);
+  NoteChange(*hull);
   feed.NoteHull(locked, replaced, hull);
 }
 
 void RegistryState::ApplyDeletion(Locked& locked, const HullPointer& hull, uint64_t revision) {
   const HullRecord& record = hull->committed().record;
-  catalog.Publish(revision);
-  catalog.NoteVertices(record.vertex_count, 0);
-  catalog.NoteHullEnded();
-  catalog.NoteChange(*hull);
+  Publish(revision);
+  NoteVertices(record.vertex_count, 0);
+  --kept_hulls_;
+  NoteChange(*hull);
   feed.NoteDeleted(locked, record.hull_id, Incarnation::Of(record), revision);
-  catalog.Forget(locked, hull, Gone(record.hull_id, "deleted"));
+  Forget(locked, hull, Gone(record.hull_id, "deleted"));
 }
 
 void RegistryState::ApplyChunk(Locked& locked, const HullPointer& hull,
@@ -63,27 +216,27 @@ void RegistryState::ApplyChunk(Locked& locked, const HullPointer& hull,
   const HullRecord before = hull->committed().record;
   const HullRecord& after = chunk.hull.record;
   hull->Commit(locked, chunk.hull, chunk.mark, chunk.writer, chunk.vertices);
-  catalog.NoteChange(*hull);
+  NoteChange(*hull);
   if (after.revision != before.revision) {
-    catalog.Publish(after.revision);
-    catalog.NoteVertices(before.vertex_count, after.vertex_count);
+    Publish(after.revision);
+    NoteVertices(before.vertex_count, after.vertex_count);
     feed.NoteHull(locked, Incarnation::Of(before), hull);
   }
-  preparer.ScheduleIfWorn(hull);
+  PrepareIfWorn(hull);
 }
 
 void RegistryState::ApplyBody(Locked& locked, const std::string& id,
                               const std::shared_ptr<const Body>& body, uint64_t revision) {
   std::optional<Incarnation> former;
-  if (const auto known = catalog.FindBody(id)) former = Incarnation::Of(known->record());
-  catalog.Publish(revision);
+  if (const auto known = FindBody(id)) former = Incarnation::Of(known->record());
+  Publish(revision);
   // For readers that look for a hull with this ID.
-  catalog.recent_changes().Note(id);
-  catalog.bodies().Set(locked, id, body);
+  recent_changes.Note(id);
+  bodies.Set(locked, id, body);
   if (body != nullptr) {
     feed.NoteBody(locked, former, body);
   } else {
-    catalog.NoteBodyEnded();
+    --kept_bodies_;
     feed.NoteDeleted(locked, id, *former, revision);
   }
 }
@@ -91,13 +244,13 @@ void RegistryState::ApplyBody(Locked& locked, const std::string& id,
 HullPointer RegistryState::ApplyPeerChange(Locked& locked, const std::string& id,
                                            const PeerChange& change, uint64_t since) {
   const std::optional<Incarnation> former = FindFormer(id, change, since);
-  HullPointer hull = catalog.hulls().Find(id);
+  HullPointer hull = hulls.Find(id);
   // False for changes that were part of the initial load.
-  const bool is_new = change.revision > catalog.revision();
+  const bool is_new = change.revision > revision();
   if (is_new) {
-    catalog.Publish(change.revision);
+    Publish(change.revision);
     // Includes hulls that were created and deleted in between: a reader must learn of the interval.
-    catalog.recent_changes().Note(id);
+    recent_changes.Note(id);
   }
   if (hull != nullptr) {
     if (ApplyPeerVersion(locked, hull, change, is_new)) return hull;
@@ -105,8 +258,8 @@ HullPointer RegistryState::ApplyPeerChange(Locked& locked, const std::string& id
   }
   ApplyPeerBody(locked, id, change);
   if (change.hull.has_value()) {
-    catalog.AddStored(id, *change.hull);
-    catalog.NoteChange(*catalog.hulls().Find(id));
+    AddStored(id, *change.hull);
+    NoteChange(*hulls.Find(id));
   }
   if (is_new) Note(locked, id, change, former);
   return hull;
@@ -116,9 +269,9 @@ HullPointer RegistryState::ApplyPeerChange(Locked& locked, const std::string& id
 // the peer change supplies it.
 std::optional<Incarnation> RegistryState::FindFormer(const std::string& id,
                                                      const PeerChange& change, uint64_t since) {
-  if (catalog.IsKnown(id)) {
-    if (const auto body = catalog.FindBody(id)) return Incarnation::Of(body->record());
-    const HullPointer hull = catalog.hulls().Find(id);
+  if (IsKnown(id)) {
+    if (const auto body = FindBody(id)) return Incarnation::Of(body->record());
+    const HullPointer hull = hulls.Find(id);
     if (hull == nullptr) return std::nullopt;
     return Incarnation::Of(hull->committed().record);
   }
@@ -141,14 +294,14 @@ bool RegistryState::ApplyPeerVersion(Locked& locked, const HullPointer& hull,
   const HullRecord& before = hull->committed().record;
   if (before.create_revision != stored.record.create_revision) return false;
   // Applies even if the record is the same: an empty chunk advances its writer's sequence.
-  if (!catalog.is_cache()) {
-    catalog.NoteVertices(before.vertex_count, stored.record.vertex_count);
+  if (!is_cache_) {
+    NoteVertices(before.vertex_count, stored.record.vertex_count);
   }
   const bool grew =
       hull->Supersede(locked, stored, change.growth.has_value() ? &*change.growth : nullptr);
-  catalog.statistics().grown += grew;
-  if (grew) preparer.ScheduleIfWorn(hull);
-  catalog.NoteChange(*hull);
+  statistics.grown += grew;
+  if (grew) PrepareIfWorn(hull);
+  NoteChange(*hull);
   if (is_new) feed.NoteHull(locked, Incarnation::Of(stored.record), hull);
   return true;
 }
@@ -156,30 +309,29 @@ bool RegistryState::ApplyPeerVersion(Locked& locked, const HullPointer& hull,
 // Ends the known hull, which was deleted or replaced.
 void RegistryState::EndFormer(Locked& locked, const HullPointer& former, const PeerChange& change) {
   const HullRecord& record = former->committed().record;
-  if (!catalog.is_cache()) catalog.NoteVertices(record.vertex_count, 0);
-  catalog.NoteChange(*former);
+  if (!is_cache_) NoteVertices(record.vertex_count, 0);
+  NoteChange(*former);
   former->Vanish();
-  catalog.Forget(locked, former,
-                 Gone(record.hull_id, change.hull.has_value() ? "replaced" : "deleted"));
+  Forget(locked, former, Gone(record.hull_id, change.hull.has_value() ? "replaced" : "deleted"));
 }
 
 void RegistryState::ApplyPeerBody(Locked& locked, const std::string& id, const PeerChange& change) {
-  const BodyTable::Entry* const entry = catalog.bodies().Find(id);
+  const BodyTable::Entry* const entry = bodies.Find(id);
   HULLD_CHECK(entry == nullptr || !entry->in_flight);
   if (change.body.has_value()) {
-    if (!catalog.is_cache() && entry == nullptr) catalog.NoteBodyFound();
-    catalog.AddBody(locked, id, *change.body);
+    if (!is_cache_ && entry == nullptr) ++kept_bodies_;
+    AddBody(locked, id, *change.body);
   } else if (entry != nullptr) {
-    if (!catalog.is_cache()) catalog.NoteBodyEnded();
-    catalog.EraseBody(locked, id);
+    if (!is_cache_) --kept_bodies_;
+    EraseBody(locked, id);
   }
 }
 
-// Notes the change in the feed. Requires: the catalog contains it.
+// Notes the change in the feed. Requires: the tables contain it.
 void RegistryState::Note(Locked& locked, const std::string& id, const PeerChange& change,
                          const std::optional<Incarnation>& former) {
-  const std::shared_ptr<const Body> body = catalog.FindBody(id);
-  const HullPointer hull = change.hull.has_value() ? catalog.hulls().Find(id) : nullptr;
+  const std::shared_ptr<const Body> body = FindBody(id);
+  const HullPointer hull = change.hull.has_value() ? hulls.Find(id) : nullptr;
   if (body != nullptr && body->damage().ok()) return feed.NoteBody(locked, former, body);
   if (hull != nullptr && !hull->state.damaged()) return feed.NoteHull(locked, former, hull);
   const bool has_ended =
@@ -192,6 +344,50 @@ void RegistryState::Note(Locked& locked, const std::string& id, const PeerChange
     // A damaged record cannot be described.
     feed.NoteOther(locked, change.revision);
   }
+}
+
+void RegistryState::ApplyOther(Locked& locked, uint64_t revision) {
+  Publish(revision);
+  feed.NoteOther(locked, revision);
+}
+
+void RegistryState::Prepare(Locked& locked, RegisteredHull& hull) {
+  HULLD_CHECK(!hull.is_preparing() && hull.live() != nullptr);
+  hull.SetPreparing(true);
+  hull.ResetWear();
+  const std::shared_ptr<LiveHull> live = hull.live();
+  const LiveHull::Mark mark = hull.committed_mark();
+  locked.Unlock();
+  live->Prepare(mark);
+  locked.Lock();
+  hull.SetPreparing(false);
+  if (hull.live() != live) return;
+  hull.NotePrepared(locked);
+  NoteChange(hull);
+}
+
+void RegistryState::SchedulePreparing(const HullPointer& hull) {
+  HULLD_CHECK(!hull->is_preparing());
+  hull->SetPreparing(true);
+  preparer_->Submit([this, hull] {
+    Locked locked(mutex);
+    hull->SetPreparing(false);
+    if (has_ended_preparing_ || hull->live() == nullptr) return;
+    Prepare(locked, *hull);
+    memory.Evict(locked);
+  });
+}
+
+void RegistryState::PrepareIfWorn(const HullPointer& hull) {
+  if (!has_ended_preparing_ && hull->IsWorn() && !hull->is_preparing()) SchedulePreparing(hull);
+}
+
+void RegistryState::EndPreparing() {
+  {
+    const std::lock_guard lock(mutex);
+    has_ended_preparing_ = true;
+  }
+  preparer_.reset();
 }
 
 }  // namespace hulld::server

@@ -22,7 +22,6 @@
 #include "server/registry/memory/memory_budget.h"
 #include "server/registry/watch/change_watch.h"
 #include "server/registry/watch/deletion_log.h"
-#include "server/registry/watch/page_source.h"
 #include "server/store/store.h"
 
 namespace hulld::server {

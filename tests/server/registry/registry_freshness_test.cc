@@ -138,7 +138,8 @@ class RegistryFreshnessTest : public ::testing::Test {
   }
   // Returns true if gRPC's thread may answer.
   bool IsAnsweredAtOnce(const std::string& id, const Freshness& freshness) {
-    return registry_.reader().TryResolve(std::span(&id, 1), {.freshness = freshness}).has_value();
+    return registry_.Resolve(std::span(&id, 1), {}, {.freshness = freshness, .may_wait = false})
+        .ok();
   }
 
   TestRegistry<SharedStore> hulls_{std::make_unique<SharedStore>()};

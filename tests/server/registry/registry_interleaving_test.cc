@@ -65,7 +65,7 @@ TEST_F(RegistryInterleaving, ManyReadersOfOneHullReadItOnce) {
   readers.push_back(StartResolve({"h"}, {}));
   gate.WaitUntilReached();
   for (int i = 0; i < 3; ++i) readers.push_back(StartResolve({"h", "h"}, {}));
-  EXPECT_FALSE(registry_.reader().TryResolve(std::vector<std::string>{"h"}).has_value());
+  EXPECT_FALSE(registry_.Resolve(std::vector<std::string>{"h"}, {}, {.may_wait = false}).ok());
   gate.Open();
   for (auto& reader : readers) {
     const auto resolved = reader.get();

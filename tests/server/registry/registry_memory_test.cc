@@ -68,13 +68,13 @@ TEST_F(RegistryMemory, AHullThatIsOnlyReadNeedsNoBuilder) {
   EXPECT_GT(hulls_->registry().Cache().bytes, builder.MemoryBytes());
   Start();
   const std::vector<std::string> ids = {"h"};
-  EXPECT_FALSE(hulls_->registry().reader().TryResolve(ids).has_value());
+  EXPECT_FALSE(hulls_->registry().Resolve(ids, {}, {.may_wait = false}).ok());
   EXPECT_EQ(hulls_->registry().Cache().hits, 0);
   const HullView view = *hulls_->View("h");
   EXPECT_EQ(view.served->canonical(), nullptr);
   EXPECT_EQ(view.served->query_hull().point_count(), 2000);
   EXPECT_LT(hulls_->registry().Cache().bytes, builder.MemoryBytes() / 2);
-  EXPECT_TRUE(hulls_->registry().reader().TryResolve(ids).has_value());
+  EXPECT_TRUE(hulls_->registry().Resolve(ids, {}, {.may_wait = false}).ok());
   // A writer continues with the points that the reader loaded.
   ASSERT_TRUE(hulls_->Put("h", {{2, 0, 0}}).ok());
   EXPECT_EQ(hulls_->registry().Cache().loads, 1);
@@ -123,7 +123,7 @@ TEST_F(RegistryMemory, APinnedVersionIsNotReadAgain) {
     const MemoryCharge charge(registry.memory(), MemoryUse::kReading, registry.Cache().limit_bytes);
     EXPECT_TRUE(registry.CheckMemory(MemoryUse::kWriting).ok());
   }
-  ASSERT_FALSE(registry.reader().TryResolve(ids).has_value());
+  ASSERT_FALSE(registry.Resolve(ids, {}, {.may_wait = false}).ok());
   const uint64_t loads = registry.Cache().loads;
   const absl::StatusOr<Resolved> second = registry.reader().Refresh(ids, known, {}, plan);
   ASSERT_TRUE(second.ok() && second->hulls[0].ok());
@@ -498,7 +498,7 @@ TEST_F(RegistryMemory, AnIdleHullIsNotReadAgain) {
   for (int i = 0; i < 2; ++i) registry.RestIdleHulls();
   EXPECT_GT(registry.Cache().bytes, 0);
   const std::vector<std::string> ids = {"h"};
-  EXPECT_TRUE(registry.reader().TryResolve(ids).has_value());
+  EXPECT_TRUE(registry.Resolve(ids, {}, {.may_wait = false}).ok());
   EXPECT_EQ(registry.Cache().loads, 0);
   EXPECT_EQ(hulls_->View("h")->record.vertex_count, 8);
 }

@@ -155,10 +155,10 @@ TEST_F(RegistryRecords, MissingRecordsAreCached) {
 TEST_F(RegistryRecords, NonblockingReadsFailUntilTheRecordIsKnown) {
   Start(1000);
   const std::vector<std::string> ids = {"h1"};
-  EXPECT_FALSE(registry_.reader().TryResolve(ids).has_value());
+  EXPECT_FALSE(registry_.Resolve(ids, {}, {.may_wait = false}).ok());
   EXPECT_EQ(store_.questions, 0);
   ExpectThere(ids);
-  EXPECT_TRUE(registry_.reader().TryResolve(ids).has_value());
+  EXPECT_TRUE(registry_.Resolve(ids, {}, {.may_wait = false}).ok());
 }
 
 // Records requested later replace earlier ones.
@@ -193,7 +193,7 @@ TEST_F(RegistryRecords, BodiesAreReadOnceAndManyAtATime) {
 TEST_F(RegistryRecords, MissingBodiesAreCached) {
   Start(1000);
   const std::vector<std::string> ids = {"h1", "b2", "none"};
-  EXPECT_FALSE(registry_.bodies().TryFind(ids).has_value());
+  EXPECT_FALSE(registry_.bodies().Find(ids, {}, false).status.ok());
   EXPECT_EQ(store_.questions, 0);
   const FoundBodies found = registry_.bodies().Find(ids);
   ASSERT_TRUE(found.status.ok()) << found.status;
@@ -201,7 +201,7 @@ TEST_F(RegistryRecords, MissingBodiesAreCached) {
   EXPECT_NE(found.bodies[1], nullptr);
   EXPECT_EQ(found.bodies[2], nullptr);
   EXPECT_EQ(store_.questions, 1);
-  EXPECT_TRUE(registry_.bodies().TryFind(ids).has_value());
+  EXPECT_TRUE(registry_.bodies().Find(ids, {}, false).status.ok());
   const absl::StatusOr<Resolved> resolved = registry_.Resolve(ids, {});
   ASSERT_TRUE(resolved.ok()) << resolved.status();
   EXPECT_TRUE(resolved->hulls[0].ok());
@@ -266,7 +266,7 @@ TEST_F(RegistryRecords, BodiesAreListedPageByPageWithoutBeingKept) {
   }
   EXPECT_EQ(after, "b59");
   EXPECT_EQ(store_.questions, 10);
-  EXPECT_FALSE(registry_.bodies().TryFind(Ids(10, 1, "b")).has_value());
+  EXPECT_FALSE(registry_.bodies().Find(Ids(10, 1, "b"), {}, false).status.ok());
 }
 
 // The batch that says so does not wait, although the existing hulls are not read yet.

@@ -89,8 +89,8 @@ TEST_F(RegistryTest, AnAcknowledgedChunkIsSeenAtOnce) {
   const AppendSession session = Open("h");
   for (uint64_t i = 1; i <= 100; ++i) {
     ASSERT_TRUE(Append(session, i, {Vector(static_cast<double>(i), 0, 0)}).ok());
-    const auto tried = registry_.reader().TryResolve(ids);
-    ASSERT_TRUE(tried.has_value());
+    const auto tried = registry_.Resolve(ids, {}, {.may_wait = false});
+    ASSERT_TRUE(tried.ok());
     ASSERT_EQ(tried->hulls.size(), 2);
     EXPECT_EQ(tried->as_of.revision, registry_.Sizes().store_revision);
     EXPECT_EQ(tried->hulls[0]->record.counts.received, i);
@@ -264,14 +264,15 @@ TEST_F(RegistryTest, PreparationPrecedesOnlyWaitingQueries) {
   const std::vector<std::string> ids = {"h"};
   ASSERT_TRUE(Append(Open("h"), 1, Paraboloid()).ok());
   const ReadPlan many = {1'000'000, true};
-  EXPECT_FALSE(registry_.reader().TryResolve(ids, many).has_value());
-  const auto before = registry_.reader().TryResolve(ids);
-  ASSERT_TRUE(before.has_value());
+  const ReadPlan many_now = {1'000'000, true, {}, false};
+  EXPECT_FALSE(registry_.Resolve(ids, {}, many_now).ok());
+  const auto before = registry_.Resolve(ids, {}, {.may_wait = false});
+  ASSERT_TRUE(before.ok());
   const auto prepared = registry_.Resolve(ids, {}, many);
   ASSERT_TRUE(prepared.ok());
   EXPECT_NE(prepared->hulls[0]->served, before->hulls[0]->served);
-  const auto after = registry_.reader().TryResolve(ids, many);
-  ASSERT_TRUE(after.has_value());
+  const auto after = registry_.Resolve(ids, {}, many_now);
+  ASSERT_TRUE(after.ok());
   EXPECT_EQ(after->hulls[0]->served, prepared->hulls[0]->served);
   // The snapshot is that of the revision, regardless of preparation.
   EXPECT_EQ(&CanonicalOf(*before->hulls[0]), &CanonicalOf(*after->hulls[0]));
@@ -298,13 +299,14 @@ TEST_F(RegistryTest, PointsThatAreNoVerticesAnyMoreLeaveMemory) {
 TEST_F(RegistryTest, FrequentlyQueriedHullsArePrepared) {
   const std::vector<std::string> ids = {"h"};
   ASSERT_TRUE(Append(Open("h"), 1, Paraboloid()).ok());
-  const auto first = registry_.reader().TryResolve(ids, {1'000'000, false});
-  ASSERT_TRUE(first.has_value());
+  const auto first = registry_.Resolve(ids, {}, {1'000'000, false, {}, false});
+  ASSERT_TRUE(first.ok());
   // Bounded by the test's time limit only.
-  while (registry_.reader().TryResolve(ids)->hulls[0]->served == first->hulls[0]->served) {
+  while (registry_.Resolve(ids, {}, {.may_wait = false})->hulls[0]->served ==
+         first->hulls[0]->served) {
     std::this_thread::yield();
   }
-  EXPECT_TRUE(registry_.reader().TryResolve(ids, {1'000'000, true}).has_value());
+  EXPECT_TRUE(registry_.Resolve(ids, {}, {1'000'000, true, {}, false}).ok());
 }
 
 TEST_F(RegistryTest, ADeletionWaitsForTheChunkInProgressAndRefusesTheNext) {

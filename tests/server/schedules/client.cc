@@ -251,13 +251,13 @@ void Client::List() {
 bool Client::AwaitFresh(const Freshness& freshness) {
   const auto told = std::make_shared<Event>();
   const auto fresh = std::make_shared<absl::Status>();
-  const bool asks =
-      simulation_.registry.barrier().StartFresh(freshness, [=](const absl::Status& status) {
-        if (told->is_set()) Scheduler::Current().Fail("a reader is notified twice");
-        *fresh = status;
-        told->Set();
-      });
-  if (!asks) return false;
+  ReadBarrier& barrier = simulation_.registry.barrier();
+  if (barrier.TryFresh(freshness).has_value()) return false;
+  barrier.StartFetch([=](const absl::Status& status) {
+    if (told->is_set()) Scheduler::Current().Fail("a reader is notified twice");
+    *fresh = status;
+    told->Set();
+  });
   told->Wait();
   return fresh->ok();
 }
@@ -277,12 +277,12 @@ void Client::Read() {
   absl::StatusOr<Resolved> resolved = absl::UnknownError("");
   if (way == 1) {
     read_plan.freshness.began = SteadyClock::now();
-    std::optional<Resolved> tried = simulation_.registry.reader().TryResolve(ids, read_plan);
-    if (!tried.has_value() && AwaitFresh(read_plan.freshness)) {
-      tried = simulation_.registry.reader().TryResolve(ids, read_plan);
+    read_plan.may_wait = false;
+    resolved = simulation_.registry.Resolve(ids, {}, read_plan);
+    if (!resolved.ok() && AwaitFresh(read_plan.freshness)) {
+      resolved = simulation_.registry.Resolve(ids, {}, read_plan);
     }
-    if (!tried.has_value()) return;
-    resolved = *std::move(tried);
+    if (!resolved.ok()) return;
   } else if (way == 2) {
     resolved = simulation_.registry.reader().Refresh(ids, known_, stop, read_plan);
   } else {

@@ -141,14 +141,9 @@ void Client::FindBodies() {
     if (MayFail(call, fresh, false)) return;
     Fail(call, absl::StrCat("unexpected error: ", fresh.ToString()));
   }
-  FoundBodies found;
-  if (random().OneIn(3)) {
-    std::optional<FoundBodies> tried = simulation_.registry.bodies().TryFind(ids);
-    if (!tried.has_value()) return;
-    found = *std::move(tried);
-  } else {
-    found = simulation_.registry.bodies().Find(ids, stop);
-  }
+  const bool may_wait = !random().OneIn(3);
+  const FoundBodies found = simulation_.registry.bodies().Find(ids, stop, may_wait);
+  if (!may_wait && !found.status.ok()) return;
   ++simulation_.reached.answers;
   if (!found.status.ok()) {
     if (MayFail(call, found.status, true)) return;

@@ -30,7 +30,7 @@ class HullTableTest : public ::testing::Test {
  protected:
   // One full turn and one more step.
   void GoRound() {
-    for (size_t i = 0; i <= table_.size(); ++i) table_.RestSome();
+    for (size_t i = 0; i <= table_.size(); ++i) table_.RestSome(locked_);
   }
   bool IsAwake(const std::string& id) const {
     return table_.entries().find(id)->second.awake() != nullptr;
@@ -135,7 +135,7 @@ TEST_F(HullTableTest, DamagedHullsStayMarkedAsDamaged) {
 TEST_F(HullTableTest, TheHandGoesRoundAnyNumberOfHulls) {
   for (int i = 0; i < 37; ++i) table_.AddResting(Stored("h" + std::to_string(i), i + 1));
   for (int i = 0; i < 37; ++i) ASSERT_NE(table_.Find("h" + std::to_string(i)), nullptr);
-  for (size_t step = 0; step <= 37 / HullTable::kHullsPerStep + 1; ++step) table_.RestSome();
+  for (size_t step = 0; step <= 37 / HullTable::kHullsPerStep + 1; ++step) table_.RestSome(locked_);
   for (int i = 0; i < 37; ++i) EXPECT_FALSE(IsAwake("h" + std::to_string(i))) << i;
 }
 

@@ -274,8 +274,7 @@ TEST_F(CommitterTest, AStoreThatRecoveredNoLongerFails) {
   std::promise<absl::Status> told;
   {
     const Locked locked(order_);
-    committer_.AddBarrier(locked,
-                          [&](Locked&, const absl::Status& status) { told.set_value(status); });
+    committer_.AddBarrier([&](Locked&, const absl::Status& status) { told.set_value(status); });
   }
   EXPECT_TRUE(told.get_future().get().ok());
   EXPECT_FALSE(committer_.Statistics().failing);
@@ -379,7 +378,7 @@ TEST(Committer, ABatchWithoutAKnownOutcomeIsRefusedBeforeAnybodyLooks) {
                      [&](Locked&, const absl::Status& status, const Change&) {
                        events.push_back(Committer::IsSuperseded(status) ? "superseded" : "refused");
                      });
-    committer.AddBarrier(locked, [&](Locked&, const absl::Status&) { followed.set_value(); });
+    committer.AddBarrier([&](Locked&, const absl::Status&) { followed.set_value(); });
   }
   gate.entered.get_future().wait();
   store.found_by_fetch.revision = 7;
@@ -400,8 +399,7 @@ TEST(Committer, FollowersReceiveChangesFoundLater) {
     std::promise<absl::Status> told;
     {
       const Locked locked(order);
-      committer.AddBarrier(locked,
-                           [&](Locked&, const absl::Status& status) { told.set_value(status); });
+      committer.AddBarrier([&](Locked&, const absl::Status& status) { told.set_value(status); });
     }
     return told.get_future().get();
   };
@@ -491,7 +489,7 @@ TEST(Committer, GrowthIsFetchedAfterPeerChangesAreKnown) {
     std::promise<void> told;
     {
       const Locked locked(order);
-      committer.AddBarrier(locked, [&](Locked&, const absl::Status&) { told.set_value(); });
+      committer.AddBarrier([&](Locked&, const absl::Status&) { told.set_value(); });
     }
     told.get_future().get();
     const std::lock_guard lock(order);

@@ -427,7 +427,7 @@ TEST_F(PostgresRecords, AWatchReportsExistingAndDeletedRecords) {
   ASSERT_TRUE(PutBody(*hulls_, "b").ok());
   // Evicts the cached knowledge of these IDs.
   for (int i = 0; i < 100; ++i) hulls_->View(absl::StrCat("none-", i)).IgnoreError();
-  EXPECT_FALSE(registry.bodies().TryFind(std::vector<std::string>{"b"}).has_value());
+  EXPECT_FALSE(registry.bodies().Find(std::vector<std::string>{"b"}, {}, false).status.ok());
   const auto told = [&](uint64_t after, bool bodies = false) {
     std::vector<std::pair<std::string, bool>> events;
     const WatchTarget target{.bodies = bodies};
