@@ -244,12 +244,11 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   void OpenWith(absl::Status status, bool may_wait) {
     if (status.ok()) status = Charge();
     if (status.ok()) {
-      const absl::StatusOr<bool> resolved = Resolve(may_wait);
-      if (resolved.ok() && !*resolved) {
+      status = Resolve(may_wait);
+      if (!status.ok() && !may_wait) {
         if (AwaitsFresh()) return;
         return this->RunOn(parts_.long_readers, [this] { OpenWith(absl::OkStatus(), true); });
       }
-      status = resolved.status();
     }
     if (status.ok()) {
       // The head can be sent during preparation.
@@ -265,13 +264,11 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     });
   }
 
-  // Resolves the hulls. Returns false if that could block and `may_wait` is false.
-  absl::StatusOr<bool> Resolve(bool may_wait) {
+  // Resolves the hulls. If `may_wait` is false, fails instead of blocking.
+  absl::Status Resolve(bool may_wait) {
     const ReadPlan plan = {2 * expected_pairs_ / std::max<uint64_t>(1, table_.hull_count()), true,
                            freshness_, may_wait};
-    absl::Status resolved = table_.Resolve(registry(), query_, plan);
-    if (may_wait && !resolved.ok()) return resolved;
-    return resolved.ok();
+    return table_.Resolve(registry(), query_, plan);
   }
 
   // Charges the call's memory. RESOURCE_EXHAUSTED: no room for it. A small call is admitted

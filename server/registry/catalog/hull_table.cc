@@ -231,8 +231,7 @@ void HullTable::RestSome(Locked& locked) {
     const auto looked_at = next++;
     Entry& entry = looked_at->second;
     if (entry.awake_ != nullptr) {
-      // A small hull in memory rests when it is idle (RestIdle).
-      if (entry.awake_->live() != nullptr || !RestCompact(locked, entry)) continue;
+      if (!entry.awake_->IsAtRest() || !RestCompact(locked, entry)) continue;
     }
     if (!is_cache() || entries_.size() <= *most_ || std::exchange(entry.is_used_, false)) continue;
     if (!entry.is_absent_) --size_;

@@ -7,7 +7,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <deque>
 #include <memory>
 #include <optional>
 #include <span>
@@ -130,7 +129,7 @@ class KnownHulls {
   // Hulls to look up; processed from the back.
   std::vector<uint32_t> due_;
   // Reads from the store, in the order of processing; empty between lookups.
-  std::deque<Loading> ahead_;
+  std::vector<Loading> ahead_;
   // Position in due_: the hulls from here on were already scanned for hulls to read.
   size_t ahead_end_ = 0;
   // Changes before this position were applied; empty before the first lookup.

@@ -184,6 +184,8 @@ class RegisteredHull {
   void NoteUse();
   // Updates the time of last use after a read that changed no memory. Cost: O(1).
   void NoteRead() { account.Touch(); }
+  // True if the stored record alone can restore the hull.
+  bool IsAtRest() const { return IsUnused() && live() == nullptr && in_flight_.writers.empty(); }
   // Returns the points and sequences that restore the hull together with its record; null unless it
   // is small and unused. Cost: O(points).
   std::unique_ptr<CompactHull> Compact() const;

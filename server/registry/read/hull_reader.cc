@@ -295,7 +295,7 @@ bool HullReader::BeginLoading(Locked& locked, const HullsRead& read) {
 void HullReader::EndLoading(Locked& locked, const HullsRead& read) {
   KnownHulls& hulls = read.known;
   const KnownHulls::Loading loading = std::move(hulls.ahead_.front());
-  hulls.ahead_.pop_front();
+  hulls.ahead_.erase(hulls.ahead_.begin());
   locked.Unlock();
   std::vector<LoadJob::Loaded> loaded = loading.job->Finish(read.should_stop);
   locked.Lock();
