@@ -122,7 +122,7 @@ int RunDoctor(const std::vector<std::string>& arguments) {
       ->envname("HULLD_DATA_DIR")
       ->required();
   app.add_flag("--json", json, "Print one JSON object");
-  app.add_flag("--accept-loss,--cut-log", accept_loss,
+  app.add_flag("--accept-loss", accept_loss,
                "Accept the loss of acknowledged changes if the log is damaged or truncated. The "
                "store gets a new ID. Without this flag, nothing is changed");
   app.footer(

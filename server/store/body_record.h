@@ -40,8 +40,7 @@ struct StoredBody {
   size_t MemoryBytes() const;
 };
 
-// Encodes all fields but the ID, which is the key. Radii follow at the end unless all are 0, which
-// keeps the encoding of records from before radii existed.
+// Encodes all fields but the ID, which is the key. Radii follow at the end unless all are 0.
 std::string EncodeStoredBody(const StoredBody& body);
 // DATA_LOSS: the bytes do not encode a body.
 absl::StatusOr<StoredBody> DecodeStoredBody(std::string_view body_id, std::string_view value);

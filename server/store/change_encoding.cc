@@ -45,16 +45,13 @@ void PutBase(rocksdb::WriteBatch& batch, const Change& change) {
   }
 }
 
-// The first body raises the store's format, so that an older hulld cannot open it and create a hull
-// under the ID of a body.
 void EncodeBody(rocksdb::WriteBatch& batch, const StoredBody& body, bool deleted) {
   const std::string key = BodyKey(body.record.body_id);
   if (deleted) {
     batch.Delete(key);
-    return;
+  } else {
+    PutSealed(batch, key, EncodeStoredBody(body));
   }
-  PutSealed(batch, kFormatKey, EncodeNumber(kStoreFormat));
-  PutSealed(batch, key, EncodeStoredBody(body));
 }
 
 }  // namespace

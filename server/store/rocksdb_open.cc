@@ -252,8 +252,8 @@ absl::Status RocksDbStore::DropLogsFrom(uint64_t number) {
   return status.ok() ? absl::OkStatus() : OpenError(status, options_.data_dir, false);
 }
 
-// A new store, a store of an older hulld, and a store with an accepted loss, which already has its
-// new ID, get a new mark.
+// A new store, a restored backup, and a store with an accepted loss, which already has its new ID,
+// get a new mark.
 absl::Status RocksDbStore::StartMark() {
   if (files_->keeps_mark()) return absl::OkStatus();
   const rocksdb::IOStatus started = files_->StartMark(LogMarkPath(options_.data_dir), revision_);
@@ -276,11 +276,8 @@ absl::Status RocksDbStore::ReadMeta() {
     if (absl::Status s = InitializeMeta(); !s.ok()) return s;
     return BeginRun();
   }
-  if (**format > kStoreFormat) {
-    return absl::FailedPreconditionError(
-        absl::StrCat("--data-dir ", options_.data_dir, " is in format ", **format,
-                     "; this hulld reads formats up to ", kStoreFormat,
-                     "; run the hulld version that wrote it"));
+  if (**format != kStoreFormat) {
+    return OtherFormat(absl::StrCat("--data-dir ", options_.data_dir), **format, kStoreFormat);
   }
   const absl::StatusOr<std::optional<std::string>> mark = ReadMigrationMark();
   if (absl::IsUnavailable(mark.status())) return mark.status();
@@ -304,7 +301,7 @@ absl::Status RocksDbStore::ReadMeta() {
 absl::Status RocksDbStore::InitializeMeta() {
   id_ = RandomId();
   rocksdb::WriteBatch batch;
-  PutSealed(batch, kFormatKey, EncodeNumber(kFormatWithoutBodies));
+  PutSealed(batch, kFormatKey, EncodeNumber(kStoreFormat));
   PutSealed(batch, kStoreIdKey, id_);
   PutSealed(batch, kRevisionKey, EncodeNumber(0));
   return WriteMeta(&batch);

@@ -61,8 +61,8 @@ class RocksDbStore : public Store {
   // On a full disk, the store is opened with the space of the reserve: for deletions if possible,
   // otherwise read-only.
   //
-  // INVALID_ARGUMENT: no directory; FAILED_PRECONDITION: another process has it open, or a newer
-  // hulld wrote it; DATA_LOSS: its log or its files are damaged or incomplete, and nothing was
+  // INVALID_ARGUMENT: no directory; FAILED_PRECONDITION: another process has it open, or it is in
+  // another format; DATA_LOSS: its log or its files are damaged or incomplete, and nothing was
   // changed; NOT_FOUND: read_only, and the store does not exist; RESOURCE_EXHAUSTED: the disk is
   // full, and the store needs a new ID or does not exist yet; UNAVAILABLE: the file system returned
   // an error.

@@ -93,6 +93,12 @@ absl::Status LogLost(const std::string& data_dir, const std::string& finding,
       "accept the loss with 'hulld doctor --accept-loss'"));
 }
 
+absl::Status OtherFormat(const std::string& where, uint64_t found, uint64_t expected) {
+  return absl::FailedPreconditionError(
+      absl::StrCat(where, " is in format ", found, "; this hulld reads only format ", expected,
+                   "; run the hulld version that wrote it"));
+}
+
 absl::Status UnfinishedMigration() {
   return absl::FailedPreconditionError(
       "the migration into it is incomplete; run the same 'hulld migrate' command again to resume "

@@ -14,9 +14,8 @@
 
 namespace hulld::server {
 
-// Keys and values of the durable store, format version 2. A store gets that version with its first
-// body. Until then it has version 1, which a hulld without bodies can open. Numbers in keys are big
-// endian, so that byte order is numeric order; numbers in values are little endian.
+// Keys and values of the durable store. Numbers in keys are big endian, so that byte order is
+// numeric order; numbers in values are little endian.
 //
 //   m/format, m/store_id, m/revision     of the store
 //   m/relaxed                            while --durability=relaxed has it open; without a value
@@ -28,14 +27,13 @@ namespace hulld::server {
 //   w<incarnation><writer ID>            the writer's last committed sequence
 //   b<incarnation><revision><part>       vertices of a base, in parts
 //   d<incarnation><revision>             vertices of a delta
-//   p<body ID>                           a StoredBody, from format version 2 on
+//   p<body ID>                           a StoredBody
 //
 // An incarnation is a create_revision. Every value ends in the CRC-32 of key and value, so that
 // readers recognize a value that is damaged or belongs to another key.
 
-// The latest version, and the version of a store that never had a body.
+// Version of this format. A store in any other format is refused.
 inline constexpr uint64_t kStoreFormat = 2;
-inline constexpr uint64_t kFormatWithoutBodies = 1;
 inline constexpr char kFormatKey[] = "m/format";
 inline constexpr char kStoreIdKey[] = "m/store_id";
 inline constexpr char kRevisionKey[] = "m/revision";

@@ -19,22 +19,18 @@ constexpr int kBeatsPerMeasure = 10;
 
 }  // namespace
 
-// Returns true if the tables exist. FAILED_PRECONDITION: a newer hulld created them.
+// Returns true if the tables exist. FAILED_PRECONDITION: they are in another format.
 absl::StatusOr<bool> PostgresStore::CheckFormat(Session& session) const {
   const absl::StatusOr<bool> exists = HasTable(session, "hulld.store");
   if (!exists.ok() || !*exists) return exists;
   const absl::StatusOr<uint64_t> number =
-      OnlyNumber(RunPatiently(session, "SELECT format FROM hulld.store"));
+      OnlyNumber(session.Run("SELECT format FROM hulld.store"));
   if (!number.ok()) return number.status();
-  if (*number <= kFormat) {
-    const absl::StatusOr<bool> is_marked = HasTable(session, "hulld.migration");
-    if (!is_marked.ok()) return is_marked;
-    if (options_.migrating || !*is_marked) return true;
-    return UnfinishedMigration();
-  }
-  return absl::FailedPreconditionError(absl::StrCat("the store is in format ", *number,
-                                                    "; this hulld reads formats up to ", kFormat,
-                                                    "; run the hulld version that wrote it"));
+  if (*number != kFormat) return OtherFormat("the store", *number, kFormat);
+  const absl::StatusOr<bool> is_marked = HasTable(session, "hulld.migration");
+  if (!is_marked.ok()) return is_marked;
+  if (options_.migrating || !*is_marked) return true;
+  return UnfinishedMigration();
 }
 
 absl::StatusOr<bool> PostgresStore::TryLock(Session& session) const {

@@ -19,7 +19,6 @@ namespace {
 
 constexpr int kMaxReaders = 8;
 constexpr int kMinServerVersion = 140'000;
-constexpr char kLockNotAvailable[] = "55P03";
 // Pauses between attempts to become the active server.
 constexpr std::chrono::milliseconds kFirstTurnPause{10};
 constexpr std::chrono::milliseconds kLongestTurnPause{250};
@@ -88,62 +87,6 @@ constexpr char kTables[] = R"(
     PRIMARY KEY (hull_id, incarnation, revision));
   ALTER TABLE hulld.bases ALTER COLUMN vertices SET STORAGE EXTERNAL;
   ALTER TABLE hulld.deltas ALTER COLUMN vertices SET STORAGE EXTERNAL;)";
-
-// Blocks all reads and writes of the store's row until the transaction ends. Servers of the
-// previous format also lock the table first, so none of them is left waiting for the row.
-constexpr char kAddTotals[] = R"(
-  BEGIN;
-  LOCK TABLE hulld.store IN ACCESS EXCLUSIVE MODE;
-  ALTER TABLE hulld.store ADD COLUMN IF NOT EXISTS hulls bigint NOT NULL DEFAULT 0;
-  ALTER TABLE hulld.store ADD COLUMN IF NOT EXISTS vertices bigint NOT NULL DEFAULT 0;
-  ALTER TABLE hulld.store ADD COLUMN IF NOT EXISTS bodies bigint NOT NULL DEFAULT 0;
-  ALTER TABLE IF EXISTS hulld.changes ADD COLUMN IF NOT EXISTS began bigint NOT NULL DEFAULT 0;
-  ALTER TABLE IF EXISTS hulld.changes
-    ADD COLUMN IF NOT EXISTS body_began bigint NOT NULL DEFAULT 0;)";
-
-// Hulls or bodies counted per statement, which takes about 70 ms.
-constexpr uint64_t kCountedAtOnce = 100'000;
-constexpr uint64_t kFormatThatCountsHulls = 3;
-// A record consists of 8-byte little-endian numbers; the fourth is the number of vertices.
-constexpr char kPrepareCount[] = R"(
-    PREPARE hulld_count_bodies_after(text, bigint) AS
-      SELECT count(*), 0::bigint, coalesce(max(body_id), '')
-      FROM (SELECT body_id FROM hulld.bodies WHERE body_id > $1 ORDER BY body_id LIMIT $2) b;
-    PREPARE hulld_count_hulls_after(text, bigint) AS
-      SELECT count(*), coalesce(sum(
-          CASE WHEN length(record) >= 32 THEN
-            get_byte(record, 24)::bigint + (get_byte(record, 25)::bigint << 8) +
-            (get_byte(record, 26)::bigint << 16) + (get_byte(record, 27)::bigint << 24) +
-            (get_byte(record, 28)::bigint << 32)
-          ELSE 0 END), 0)::bigint, coalesce(max(hull_id), '')
-      FROM (SELECT hull_id, record FROM hulld.hulls WHERE hull_id > $1 ORDER BY hull_id LIMIT $2) h;
-    )";
-
-// Totals of a table.
-struct Counted {
-  uint64_t rows = 0;
-  uint64_t vertices = 0;
-};
-
-// Counts in portions to keep each statement short. CANCELLED: should_stop returned true.
-absl::StatusOr<Counted> CountAll(Session& session, const char* statement,
-                                 const std::function<bool()>& should_stop) {
-  Counted all;
-  std::string last;
-  for (uint64_t counted = kCountedAtOnce; counted == kCountedAtOnce;) {
-    if (Stopped(should_stop)) {
-      return absl::CancelledError("shutdown requested while counting; nothing was changed");
-    }
-    const absl::StatusOr<Rows> part =
-        session.Ask({.name = statement, .parameters = {last, EncodeBigint(kCountedAtOnce)}});
-    if (!part.ok()) return part.status();
-    counted = part->bigint(0, 0);
-    all.rows += counted;
-    all.vertices += part->bigint(0, 1);
-    last = std::string(part->at(0, 2));
-  }
-  return all;
-}
 
 // Settings of every session. The database aborts statements of a server that has disconnected, or
 // that stalls while it holds locks. The timeouts are a choice, as in conninfo.cc, and shorter than
@@ -350,19 +293,6 @@ absl::StatusOr<std::unique_ptr<Session>> PostgresStore::OpenListener() const {
                                   "; SET synchronous_commit = off"));
 }
 
-// Retries while a starting server upgrades tables of an older format, which locks out all other
-// servers: for minutes with hundreds of millions of hulls.
-absl::StatusOr<Rows> PostgresStore::RunPatiently(Session& session, const std::string& sql) const {
-  for (bool is_first = true;; is_first = false) {
-    absl::StatusOr<Rows> rows = session.Run(sql);
-    if (SqlState(rows.status()) != kLockNotAvailable) return rows;
-    if (is_first) spdlog::info("another hulld is changing the tables; waiting until it finishes");
-    if (Stopped(options_.should_stop)) {
-      return absl::CancelledError("shutdown requested while another hulld was changing the tables");
-    }
-  }
-}
-
 // Checks the server's version and determines its durability.
 absl::Status PostgresStore::CheckServer(Session& session) {
   if (session.server_version() < kMinServerVersion) {
@@ -384,53 +314,8 @@ absl::Status PostgresStore::CheckServer(Session& session) {
   return CheckFormat(session).status();
 }
 
-absl::Status PostgresStore::MakeSchema(Session& session) {
-  if (absl::Status s = MakeTables(session); !s.ok()) return s;
-  return AddTotals(session);
-}
-
-// Adds the totals that tables of an older format lack. Meanwhile no server can commit, and servers
-// that would not maintain the totals are locked out and exit. Cost: 0.7 s for a million hulls.
-absl::Status PostgresStore::AddTotals(Session& session) const {
-  const absl::StatusOr<uint64_t> number = OnlyNumber(session.Run("SELECT format FROM hulld.store"));
-  if (!number.ok()) return number.status();
-  if (*number >= kFormat) return absl::OkStatus();
-  spdlog::info(
-      "upgrading the tables from format {} to format {}: counting hulls, vertices, and bodies",
-      *number, kFormat);
-  absl::Status status = session.Run(kAddTotals).status();
-  if (status.ok()) status = session.Run(kPrepareCount).status();
-  std::string counted;
-  if (status.ok() && *number < kFormatThatCountsHulls) {
-    const absl::StatusOr<Counted> hulls =
-        CountAll(session, "hulld_count_hulls_after", options_.should_stop);
-    status = hulls.status();
-    if (hulls.ok()) {
-      counted = absl::StrCat("hulls = ", hulls->rows, ", vertices = ", hulls->vertices, ", ");
-    }
-  }
-  if (status.ok()) {
-    const absl::StatusOr<Counted> bodies =
-        CountAll(session, "hulld_count_bodies_after", options_.should_stop);
-    status = bodies.status();
-    if (bodies.ok()) absl::StrAppend(&counted, "bodies = ", bodies->rows, ", ");
-  }
-  if (status.ok()) {
-    status = session
-                 .Run(absl::StrCat("UPDATE hulld.store SET ", counted, "format = ", kFormat,
-                                   ", owner = '', epoch = epoch + 1, written_in = epoch + 1; "
-                                   "INSERT INTO hulld.epochs (epoch, owner, batch, revision) "
-                                   "SELECT epoch, owner, batch, revision FROM hulld.store; "
-                                   "DEALLOCATE hulld_count_hulls_after; "
-                                   "DEALLOCATE hulld_count_bodies_after; COMMIT"))
-                 .status();
-  }
-  if (!status.ok()) session.Run("ROLLBACK").status().IgnoreError();
-  return status;
-}
-
 // Atomic: a server killed in the middle leaves either all of the tables or none.
-absl::Status PostgresStore::MakeTables(Session& session) {
+absl::Status PostgresStore::MakeSchema(Session& session) {
   const absl::StatusOr<bool> exists = CheckFormat(session);
   if (!exists.ok()) return exists.status();
   if (*exists) return absl::OkStatus();

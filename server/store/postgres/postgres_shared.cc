@@ -173,7 +173,7 @@ std::string PostgresStore::PrepareShared() { return absl::StrCat(kPrepareFetch, 
 // Serializes the creation of tables by servers that start together.
 absl::Status PostgresStore::MakeSharedSchema(Session& session) {
   const absl::Status locked =
-      RunPatiently(session, absl::StrCat("SELECT pg_advisory_lock(", kSchemaLock, ")")).status();
+      session.Run(absl::StrCat("SELECT pg_advisory_lock(", kSchemaLock, ")")).status();
   if (!locked.ok()) return locked;
   absl::Status made = MakeSchema(session);
   if (made.ok()) made = MakeSharedTables(session);

@@ -42,8 +42,7 @@ struct PostgresOptions {
   bool migrating = false;
   // Other servers may be active over the same database. Cannot be combined with take_over.
   bool shared = false;
-  // Polled while this waits for the active server, waits for an upgrade of the tables by another
-  // server, or upgrades them; may be empty.
+  // Polled while this waits for the active server or for sessions; may be empty.
   std::function<bool()> should_stop;
   // Maximum wait of a statement for a lock.
   std::chrono::milliseconds lock_time{15'000};
@@ -93,8 +92,8 @@ struct PostgresOptions {
 class PostgresStore : public Store, public PeerFeed {
  public:
   // Waits while another server is active, unless take_over. Creates the schema if it is missing.
-  // INVALID_ARGUMENT: no connection string. FAILED_PRECONDITION: a newer hulld created the schema,
-  // or the database is too old. CANCELLED: should_stop returned true. DATA_LOSS: the row of the
+  // INVALID_ARGUMENT: no connection string. FAILED_PRECONDITION: another version of hulld created the
+  // schema, or the database is too old. CANCELLED: should_stop returned true. DATA_LOSS: the row of the
   // store is missing. UNAVAILABLE: it cannot connect, or lacks a required permission.
   static absl::StatusOr<std::unique_ptr<PostgresStore>> Open(PostgresOptions options);
 
@@ -135,7 +134,7 @@ class PostgresStore : public Store, public PeerFeed {
   absl::StatusOr<std::string> MakeCopy() override;
   void OnEnded(std::function<void()> ended) override;
 
-  // Version of the tables. Format 3 added totals of hulls and vertices, format 4 of bodies.
+  // Version of the tables. A store in any other format is refused.
   static constexpr uint64_t kFormat = 4;
   // The epoch of this server, which only grows.
   uint64_t epoch() const { return epoch_.load(); }
@@ -164,11 +163,8 @@ class PostgresStore : public Store, public PeerFeed {
 
   // Steps of opening, in this order.
   absl::Status CheckServer(Session& session);
-  absl::StatusOr<Rows> RunPatiently(Session& session, const std::string& sql) const;
   absl::Status WaitForTurn();
   absl::Status MakeSchema(Session& session);
-  absl::Status MakeTables(Session& session);
-  absl::Status AddTotals(Session& session) const;
   absl::Status BeginPatiently();
   absl::Status RenewWriter();
   absl::StatusOr<Rows> Claim(Statement claim);

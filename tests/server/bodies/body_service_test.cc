@@ -261,28 +261,6 @@ TEST_F(DurableBodies, SurviveARestart) {
   EXPECT_EQ(MakeClient().ListAllBodies("")->bodies_size(), 1);
 }
 
-// A hulld without body support would reuse their IDs for hulls.
-TEST_F(DurableBodies, TheFirstBodyRaisesTheFormatOfTheStore) {
-  const auto format = [this] {
-    TearDown();
-    RocksDbOptions options;
-    options.data_dir = DurableConfig().data_dir;
-    options.read_only = true;
-    const auto store = RocksDbStore::Open(options);
-    EXPECT_TRUE(store.ok()) << store.status();
-    std::string sealed;
-    EXPECT_TRUE((*store)->db().Get({}, kFormatKey, &sealed).ok());
-    return *DecodeNumber(*Unseal(kFormatKey, sealed));
-  };
-  Put("cube", Cube());
-  EXPECT_EQ(format(), kFormatWithoutBodies);
-  Restart(DurableConfig());
-  ASSERT_TRUE(PutBody("b", {PlacementOf("cube")}).ok());
-  EXPECT_EQ(format(), kStoreFormat);
-  Restart(DurableConfig());
-  EXPECT_TRUE(MakeClient().GetBody("b").ok());
-}
-
 TEST_F(DurableBodies, ADamagedBodyIsNamedAndCanBeReplaced) {
   PutPair("pair");
   TearDown();

@@ -30,7 +30,7 @@ class KeptRocksDb : public KeptStore {
     store_ = store->get();
     return *std::move(store);
   }
-  uint64_t latest_format() const override { return kStoreFormat; }
+  uint64_t format() const override { return kStoreFormat; }
 
   std::string Get(const std::string& key) override {
     std::string value;
@@ -65,7 +65,7 @@ class KeptPostgres : public KeptStore {
     options.conninfo = PostgresCluster::Shared().Conninfo(database_);
     return PostgresStore::Open(std::move(options));
   }
-  uint64_t latest_format() const override { return PostgresStore::kFormat; }
+  uint64_t format() const override { return PostgresStore::kFormat; }
 
   std::string Get(const std::string& key) override {
     const Place place = PlaceOf(key);

@@ -24,7 +24,7 @@ class KeptStore {
   virtual ~KeptStore() = default;
   // Requires: any store opened before is closed.
   virtual absl::StatusOr<std::unique_ptr<Store>> Open() = 0;
-  virtual uint64_t latest_format() const = 0;
+  virtual uint64_t format() const = 0;
 
   // Requires: the store is open.
   virtual std::string Get(const std::string& key) = 0;
