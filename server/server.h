@@ -25,7 +25,6 @@
 #include "server/process/metrics.h"
 #include "server/process/metrics_endpoint.h"
 #include "server/process/task_pool.h"
-#include "server/process/worker_pool.h"
 #include "server/registry/registry.h"
 #include "server/settings/config.h"
 #include "server/store/store.h"

@@ -6,7 +6,7 @@
 #include "hulld/v1/maintenance.grpc.pb.h"
 #include "server/call/admission.h"
 #include "server/call/call_stream.h"
-#include "server/process/worker_pool.h"
+#include "server/process/task_pool.h"
 #include "server/registry/registry.h"
 #include "server/store/store.h"
 

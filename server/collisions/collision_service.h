@@ -10,7 +10,6 @@
 #include "server/call/call_stream.h"
 #include "server/collisions/placed/collision_parts.h"
 #include "server/process/task_pool.h"
-#include "server/process/worker_pool.h"
 #include "server/registry/registry.h"
 #include "server/registry/waiting_calls.h"
 

@@ -229,8 +229,7 @@ void CollisionStream::AddAnswer(uint32_t index) {
 void CollisionStream::DecideTogether() {
   decided_.resize(pairs_.selected().size());
   unclaimed_.Begin(static_cast<uint32_t>(decided_.size()));
-  const size_t wanted =
-      std::min<size_t>(parts_.pool.threads() - 1, decided_.size() / kPairsPerHelper);
+  const size_t wanted = std::min(parts_.pool.threads() - 1, decided_.size() / kPairsPerHelper);
   // Includes queued helpers of an earlier step.
   for (size_t helpers = helpers_waiting_.load(); helpers < wanted; ++helpers) {
     ++helpers_waiting_;

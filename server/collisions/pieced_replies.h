@@ -22,7 +22,6 @@
 #include "server/collisions/placed/query_settings.h"
 #include "server/process/shared_loop.h"
 #include "server/process/task_pool.h"
-#include "server/process/worker_pool.h"
 #include "server/registry/registry.h"
 #include "server/registry/waiting_calls.h"
 #include "server/settings/config.h"
@@ -111,7 +110,7 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
       : Base(request, context, parts.admission, rpc),
         parts_(parts),
         lane_(parts.pool),
-        max_pieces_(2 * static_cast<size_t>(parts.pool.threads())),
+        max_pieces_(2 * parts.pool.threads()),
         shape_(shape),
         charge_(parts.registry.memory(), MemoryUse::kReading),
         holds_head_(shape.joins_head),

@@ -20,7 +20,6 @@
 #include "server/collisions/placed/placement_table.h"
 #include "server/collisions/ranked_pairs.h"
 #include "server/process/task_pool.h"
-#include "server/process/worker_pool.h"
 #include "server/registry/registry.h"
 
 namespace hulld::server {

@@ -8,7 +8,7 @@
 #include "server/call/call.h"
 #include "server/call/call_stream.h"
 #include "server/call/unary_call.h"
-#include "server/process/worker_pool.h"
+#include "server/process/task_pool.h"
 #include "server/registry/registry.h"
 
 namespace hulld::server {

@@ -9,7 +9,7 @@
 #include "core/hull/growth/hull_builder.h"
 #include "hulld/v1/hull.pb.h"
 #include "server/call/call_stream.h"
-#include "server/process/worker_pool.h"
+#include "server/process/task_pool.h"
 #include "server/registry/registry.h"
 
 namespace hulld::server {

@@ -11,7 +11,7 @@
 
 #include "hulld/v1/hull.pb.h"
 #include "server/call/pulled_stream.h"
-#include "server/process/worker_pool.h"
+#include "server/process/task_pool.h"
 #include "server/registry/registry.h"
 #include "server/registry/watch/change_watch.h"
 

@@ -11,7 +11,7 @@
 
 #include "core/base/check.h"
 #include "server/process/synchronization.h"
-#include "server/process/worker_pool.h"
+#include "server/process/task_pool.h"
 
 namespace hulld::server {
 

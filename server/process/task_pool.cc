@@ -2,14 +2,13 @@
 
 #include <sys/prctl.h>
 
-#include <algorithm>
+#include <mutex>
+#include <thread>
 #include <utility>
 
 #include "core/base/check.h"
 
 namespace hulld::server {
-
-using Clock = std::chrono::steady_clock;
 
 TaskPool::Lane::~Lane() { HULLD_CHECK(slices_.empty()); }
 
@@ -18,7 +17,7 @@ void TaskPool::Lane::Submit(std::function<void()> slice, ClientId client) {
     const std::lock_guard lock(pool_.mutex_);
     client_ = client;
     if (slices_.empty()) pool_.lanes_.Push(client, this);
-    slices_.push_back({std::move(slice), Clock::now(), true});
+    slices_.push_back({std::move(slice), SteadyClock::now(), true});
     ++pool_.slices_waiting_;
     pool_.NoteWaiting();
   }
@@ -29,7 +28,7 @@ TaskPool::TaskPool(int threads, std::optional<PoolMetrics> single_metrics,
                    std::optional<PoolMetrics> slice_metrics)
     : single_metrics_(single_metrics),
       slice_metrics_(slice_metrics),
-      last_single_call_((Clock::now() - kReserveTime).time_since_epoch()) {
+      last_single_call_((SteadyClock::now() - kReserveTime).time_since_epoch()) {
   HULLD_CHECK(threads > 0);
   // Holds the mutex because the first threads read threads().
   const std::lock_guard lock(mutex_);
@@ -43,43 +42,43 @@ TaskPool::~TaskPool() {
     ending_ = true;
   }
   ready_.notify_all();
-  for (std::thread& thread : threads_) thread.join();
+  for (Thread& thread : threads_) thread.join();
 }
 
 void TaskPool::Submit(std::function<void()> task, ClientId client) {
   NoteSingleCall();
   {
     const std::lock_guard lock(mutex_);
-    single_calls_.Push(client, {std::move(task), Clock::now(), false});
+    single_tasks_.Push(client, {std::move(task), SteadyClock::now(), false});
     NoteWaiting();
   }
   ready_.notify_one();
 }
 
 void TaskPool::NoteSingleCall() {
-  last_single_call_.store(Clock::now().time_since_epoch(), std::memory_order_relaxed);
+  last_single_call_.store(SteadyClock::now().time_since_epoch(), std::memory_order_relaxed);
 }
 
 void TaskPool::NoteWaiting() {
-  waiting_.store(single_calls_.size(), std::memory_order_relaxed);
-  if (single_metrics_) single_metrics_->waiting.Set(static_cast<double>(single_calls_.size()));
+  waiting_.store(single_tasks_.size(), std::memory_order_relaxed);
+  if (single_metrics_) single_metrics_->waiting.Set(static_cast<double>(single_tasks_.size()));
   if (slice_metrics_) slice_metrics_->waiting.Set(static_cast<double>(slices_waiting_));
 }
 
 bool TaskPool::IsReserved() const {
-  const Clock::time_point last(last_single_call_.load(std::memory_order_relaxed));
-  return Clock::now() - last < kReserveTime;
+  const SteadyClock::time_point last(last_single_call_.load(std::memory_order_relaxed));
+  return SteadyClock::now() - last < kReserveTime;
 }
 
 bool TaskPool::MayRunSlice() const {
   if (ending_ || threads_.size() == 1) return true;
-  return slices_running_ < threads() - (IsReserved() ? 1 : 0);
+  return slices_running_ + size_t{IsReserved()} < threads();
 }
 
 std::optional<TaskPool::Task> TaskPool::Next() {
   std::optional<Task> task;
-  if (!single_calls_.empty()) {
-    task = single_calls_.Pop();
+  if (!single_tasks_.empty()) {
+    task = single_tasks_.Pop();
   } else if (!lanes_.empty() && MayRunSlice()) {
     Lane& lane = *lanes_.Pop();
     task = std::move(lane.slices_.front());
@@ -111,7 +110,7 @@ void TaskPool::Work() {
     lock.unlock();
     const std::optional<PoolMetrics>& metrics = task->is_slice ? slice_metrics_ : single_metrics_;
     if (metrics.has_value()) {
-      const auto waited = Clock::now() - task->submitted;
+      const auto waited = SteadyClock::now() - task->submitted;
       metrics->wait_seconds.Observe(std::chrono::duration<double>(waited).count());
     }
     task->run();

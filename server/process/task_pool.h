@@ -3,32 +3,31 @@
 
 #include <atomic>
 #include <chrono>
-#include <condition_variable>
 #include <cstddef>
 #include <deque>
 #include <functional>
-#include <mutex>
 #include <optional>
-#include <thread>
 #include <vector>
 
 #include "server/process/fair_queue.h"
 #include "server/process/metrics.h"
+#include "server/process/synchronization.h"
 
 namespace hulld::server {
 
-// Threads that compute answers, at the priority of the process. They take tasks from two queues.
-// Single calls come first: clients take turns, and the calls of a client stay in order of arrival.
-// Slices of long calls come next: each long call has a lane; clients take turns, and so do the
-// lanes of a client, one slice each. A slice takes about kSliceTime, so a single call waits for at
-// most one slice, and no thread waits for another.
+// Threads that run tasks at the priority of the process. They take tasks from two queues. Single
+// tasks come first: clients take turns, and the tasks of a client stay in order of arrival. Slices
+// of long calls come next: each long call has a lane; clients take turns, and so do the lanes of a
+// client, one slice each. A slice takes about kSliceTime, so a single task waits for at most one
+// slice, and no thread waits for another.
 //
-// Tasks must neither block nor wait; blocking work belongs in a WorkerPool.
+// gRPC calls back on as few as two threads, which must stay free to move bytes, so all longer work
+// runs on a pool. Tasks of a pool with lanes must neither block nor wait.
 class TaskPool {
  private:
   struct Task {
     std::function<void()> run;
-    std::chrono::steady_clock::time_point submitted;
+    SteadyClock::time_point submitted;
     bool is_slice;
   };
 
@@ -71,7 +70,7 @@ class TaskPool {
     std::deque<Task> slices_;
   };
 
-  // metrics: metrics of the queues of single calls and of slices. Requires threads > 0.
+  // metrics: metrics of the queues of single tasks and of slices. Requires threads > 0.
   explicit TaskPool(int threads, std::optional<PoolMetrics> single_metrics = std::nullopt,
                     std::optional<PoolMetrics> slice_metrics = std::nullopt);
   TaskPool(const TaskPool&) = delete;
@@ -79,15 +78,15 @@ class TaskPool {
   // Runs the queued tasks, then ends.
   ~TaskPool();
 
-  int threads() const { return static_cast<int>(threads_.size()); }
+  size_t threads() const { return threads_.size(); }
 
-  // Queues the answer of a single call ahead of all slices. client: the client that waits for it.
+  // Queues a task ahead of all slices. client: the client that waits for it.
   void Submit(std::function<void()> task, ClientId client = kNoClient);
 
   // Records a single call answered without this pool, so that slices leave it a core. Cost: ~30 ns.
   void NoteSingleCall();
 
-  // Number of single calls waiting for a thread.
+  // Number of single tasks waiting for a thread.
   size_t waiting() const { return waiting_.load(std::memory_order_relaxed); }
 
  private:
@@ -103,19 +102,22 @@ class TaskPool {
 
   std::optional<PoolMetrics> single_metrics_;
   std::optional<PoolMetrics> slice_metrics_;
-  std::atomic<std::chrono::steady_clock::duration> last_single_call_;
-  std::mutex mutex_;
+  std::atomic<SteadyClock::duration> last_single_call_;
+  Mutex mutex_;
   // The mutex guards the members below, and changes of `waiting_`.
-  std::condition_variable ready_;
-  FairQueue<Task> single_calls_;
+  ConditionVariable ready_;
+  FairQueue<Task> single_tasks_;
   // Lanes with slices.
   FairQueue<Lane*> lanes_;
   size_t slices_waiting_ = 0;
-  int slices_running_ = 0;
+  size_t slices_running_ = 0;
   std::atomic<size_t> waiting_ = 0;
   bool ending_ = false;
-  std::vector<std::thread> threads_;
+  std::vector<Thread> threads_;
 };
+
+// A pool without lanes. Its tasks may wait for the store or for a file.
+using WorkerPool = TaskPool;
 
 }  // namespace hulld::server
 

@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "server/process/metrics.h"
-#include "server/process/worker_pool.h"
+#include "server/process/task_pool.h"
 #include "server/registry/bodies/body_registry.h"
 #include "server/registry/catalog/known_hulls.h"
 #include "server/registry/catalog/registry_types.h"

@@ -13,7 +13,7 @@
 
 #include "server/access/caller.h"
 #include "server/contract/rpc.h"
-#include "server/process/worker_pool.h"
+#include "server/process/task_pool.h"
 #include "server/registry/registry.h"
 #include "server/settings/config.h"
 #include "server/store/store.h"

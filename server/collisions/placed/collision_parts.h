@@ -3,7 +3,6 @@
 
 #include "server/call/admission.h"
 #include "server/process/task_pool.h"
-#include "server/process/worker_pool.h"
 #include "server/registry/registry.h"
 #include "server/registry/waiting_calls.h"
 

@@ -12,7 +12,7 @@
 
 #include "core/hull/growth/hull_builder.h"
 #include "core/query/placed/live_hull.h"
-#include "server/process/worker_pool.h"
+#include "server/process/task_pool.h"
 #include "server/registry/catalog/registry_types.h"
 #include "server/registry/commit/committer.h"
 #include "server/registry/memory/locked.h"

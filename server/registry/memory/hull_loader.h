@@ -13,7 +13,7 @@
 #include "core/hull/growth/hull_builder.h"
 #include "core/query/placed/live_hull.h"
 #include "server/process/shared_loop.h"
-#include "server/process/worker_pool.h"
+#include "server/process/task_pool.h"
 #include "server/store/store.h"
 
 namespace hulld::server {

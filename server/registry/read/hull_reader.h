@@ -10,7 +10,7 @@
 #include <string>
 
 #include "server/process/metrics.h"
-#include "server/process/worker_pool.h"
+#include "server/process/task_pool.h"
 #include "server/registry/catalog/known_hulls.h"
 #include "server/registry/catalog/registry_types.h"
 #include "server/registry/memory/locked.h"

@@ -15,7 +15,7 @@
 
 #include "server/process/fair_queue.h"
 #include "server/process/synchronization.h"
-#include "server/process/worker_pool.h"
+#include "server/process/task_pool.h"
 #include "server/registry/commit/committer.h"
 #include "server/registry/memory/locked.h"
 #include "server/registry/peers/read_barrier.h"

@@ -12,7 +12,7 @@
 
 #include "core/query/placed/live_hull.h"
 #include "server/process/metrics.h"
-#include "server/process/worker_pool.h"
+#include "server/process/task_pool.h"
 #include "server/registry/catalog/body.h"
 #include "server/registry/catalog/body_table.h"
 #include "server/registry/catalog/hull_table.h"

@@ -20,7 +20,7 @@
 #include <utility>
 #include <vector>
 
-#include "server/process/worker_pool.h"
+#include "server/process/task_pool.h"
 #include "server/registry/registry.h"
 #include "server/store/memory_store.h"
 #include "server/store/rocksdb_store.h"

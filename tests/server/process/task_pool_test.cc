@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "server/process/shared_loop.h"
-#include "server/process/worker_pool.h"
 
 namespace hulld::server {
 namespace task_pool_test {

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "server/process/worker_pool.h"
+#include "server/process/task_pool.h"
 #include "server/registry/registry.h"
 #include "server/store/memory_store.h"
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "server/process/synchronization.h"
-#include "server/process/worker_pool.h"
+#include "server/process/task_pool.h"
 #include "tests/server/schedules/client.h"
 #include "tests/server/schedules/collision_watcher.h"
 #include "tests/server/schedules/store/shared_store.h"
