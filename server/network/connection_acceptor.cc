@@ -6,14 +6,12 @@
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <poll.h>
-#include <sys/epoll.h>
 #include <sys/eventfd.h>
 #include <sys/stat.h>
 #include <sys/un.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
 #include <chrono>
 #include <cstring>
@@ -40,21 +38,11 @@ constexpr int kPauseMilliseconds = 50;
 // considered gone.
 constexpr int kUserTimeoutMs = 20'000;
 
-// Event key of `wake_`; listeners use their index.
-constexpr uint64_t kWake = ~uint64_t{0};
-
 bool IsOutOfDescriptors(int error) {
   return error == EMFILE || error == ENFILE || error == ENOBUFS || error == ENOMEM;
 }
 
 Descriptor OpenReserve() { return Descriptor(open("/dev/null", O_RDONLY | O_CLOEXEC)); }
-
-void Register(const Descriptor& epoll, int descriptor, uint64_t key) {
-  epoll_event event = {};
-  event.events = EPOLLIN;
-  event.data.u64 = key;
-  epoll_ctl(epoll.number(), EPOLL_CTL_ADD, descriptor, &event);
-}
 
 void SetOption(int socket, int level, int option, int value) {
   setsockopt(socket, level, option, &value, sizeof value);
@@ -106,7 +94,6 @@ ConnectionAcceptor::ConnectionAcceptor(const ListenAddress& address, ConnectionT
                                        Metrics& metrics)
     : address_(address),
       table_(table),
-      epoll_(epoll_create1(EPOLL_CLOEXEC)),
       wake_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
       reserve_(OpenReserve()),
       accepted_(
@@ -128,7 +115,6 @@ ConnectionAcceptor::ConnectionAcceptor(const ListenAddress& address, ConnectionT
   first_reserved_ = static_cast<int>(std::min<uint64_t>(most - reserved, kMaxGuardedDescriptors));
   max_closing_ = std::max<uint64_t>(1, reserved / 2);
   table_.LimitTo(static_cast<size_t>(std::max(1, first_reserved_)));
-  Register(epoll_, wake_.number(), kWake);
 }
 
 absl::Status ConnectionAcceptor::BindUnix() {
@@ -192,7 +178,6 @@ void ConnectionAcceptor::Start(std::unique_ptr<grpc::experimental::ExternalConne
                                const FrameLimits* frames) {
   grpc_ = std::move(grpc);
   if (frames != nullptr) frames_ = *frames;
-  for (size_t i = 0; i < listeners_.size(); ++i) Register(epoll_, listeners_[i].number(), i);
   thread_ = std::thread([this] { Run(); });
 }
 
@@ -216,16 +201,18 @@ bool ConnectionAcceptor::AwaitRoom() {
 }
 
 void ConnectionAcceptor::Run() {
+  std::vector<pollfd> sources = {{wake_.number(), POLLIN, 0}};
+  for (const Descriptor& listener : listeners_) {
+    sources.push_back({listener.number(), POLLIN, 0});
+  }
   while (AwaitRoom()) {
-    std::array<epoll_event, 16> events;
-    const int count = epoll_wait(epoll_.number(), events.data(), events.size(), -1);
+    poll(sources.data(), sources.size(), -1);
     bool pause = false;
-    for (int i = 0; i < count; ++i) {
-      const uint64_t key = events[i].data.u64;
-      if (key != kWake) pause |= !AcceptFrom(listeners_[key].number());
+    for (size_t i = 1; i < sources.size(); ++i) {
+      if (sources[i].revents != 0) pause |= !AcceptFrom(sources[i].fd);
     }
-    pollfd wake = {.fd = wake_.number(), .events = POLLIN, .revents = 0};
-    if (pause) poll(&wake, 1, kPauseMilliseconds);
+    // Only Stop ends the pause early.
+    if (pause) poll(sources.data(), 1, kPauseMilliseconds);
   }
 }
 

@@ -89,7 +89,6 @@ class ConnectionAcceptor {
   // Maximum number of evicted connections that gRPC has not closed yet.
   size_t max_closing_;
   std::vector<Descriptor> listeners_;
-  Descriptor epoll_;
   Descriptor wake_;
   Descriptor reserve_;
   std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> grpc_;

@@ -1,11 +1,11 @@
 #include "server/network/peer_address.h"
 
+#include <absl/strings/numbers.h>
 #include <absl/strings/str_cat.h>
 #include <arpa/inet.h>
 #include <netinet/in.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cstring>
 
 namespace hulld::server {
@@ -17,14 +17,6 @@ constexpr size_t kNetworkBytes = 8;
 
 bool IsMapped(const std::array<uint8_t, 16>& address) {
   return std::equal(kMapped.begin(), kMapped.end(), address.begin());
-}
-
-PeerAddress Mapped(const in_addr& v4, uint16_t port) {
-  PeerAddress peer{.address = {}, .port = port};
-  std::copy(kMapped.begin(), kMapped.end(), peer.address.begin());
-  const auto* const bytes = reinterpret_cast<const uint8_t*>(&v4);
-  std::copy(bytes, bytes + sizeof v4, peer.address.begin() + kMappedBytes);
-  return peer;
 }
 
 }  // namespace
@@ -49,7 +41,10 @@ std::string PeerAddress::NetworkName() const {
 std::optional<PeerAddress> PeerAddress::FromSocket(const sockaddr_storage& name) {
   if (name.ss_family == AF_INET) {
     const auto& v4 = reinterpret_cast<const sockaddr_in&>(name);
-    return Mapped(v4.sin_addr, ntohs(v4.sin_port));
+    PeerAddress peer{.address = {}, .port = ntohs(v4.sin_port)};
+    std::copy(kMapped.begin(), kMapped.end(), peer.address.begin());
+    std::memcpy(peer.address.data() + kMappedBytes, &v4.sin_addr, sizeof v4.sin_addr);
+    return peer;
   }
   if (name.ss_family != AF_INET6) return std::nullopt;
   const auto& v6 = reinterpret_cast<const sockaddr_in6&>(name);
@@ -62,16 +57,11 @@ std::optional<PeerAddress> PeerAddress::FromGrpc(std::string_view peer) {
   const size_t colon = peer.rfind(':');
   const bool is_v4 = peer.starts_with("ipv4:");
   if ((!is_v4 && !peer.starts_with("ipv6:")) || colon < 5) return std::nullopt;
-  uint16_t port = 0;
-  const char* const end = peer.data() + peer.size();
-  const auto [parsed, error] = std::from_chars(peer.data() + colon + 1, end, port);
-  if (error != std::errc() || parsed != end) return std::nullopt;
+  uint32_t port = 0;
+  const std::string number(peer.substr(colon + 1));
+  if (!absl::SimpleAtoi(number, &port) || port > UINT16_MAX) return std::nullopt;
   std::string host(peer.substr(5, colon - 5));
-  if (is_v4) {
-    in_addr v4;
-    if (inet_pton(AF_INET, host.c_str(), &v4) != 1) return std::nullopt;
-    return Mapped(v4, port);
-  }
+  if (is_v4) host.insert(0, "::ffff:");
   // Brackets are percent-encoded.
   for (const char* const bracket : {"%5B", "%5D", "[", "]"}) {
     if (const size_t at = host.find(bracket); at != std::string::npos) {
@@ -80,7 +70,7 @@ std::optional<PeerAddress> PeerAddress::FromGrpc(std::string_view peer) {
   }
   // Removes the zone of a link-local address.
   host.resize(std::min(host.size(), host.find('%')));
-  PeerAddress found{.address = {}, .port = port};
+  PeerAddress found{.address = {}, .port = static_cast<uint16_t>(port)};
   if (inet_pton(AF_INET6, host.c_str(), found.address.data()) != 1) return std::nullopt;
   return found;
 }

@@ -1,10 +1,10 @@
 #include "server/process/descriptors.h"
 
-#include <dirent.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
-#include <memory>
+#include <filesystem>
+#include <system_error>
 
 namespace hulld::server {
 
@@ -13,13 +13,11 @@ Descriptor::~Descriptor() {
 }
 
 uint64_t CountDescriptors() {
-  const std::unique_ptr<DIR, int (*)(DIR*)> directory(
-      opendir("/proc/self/fd"), [](DIR* opened) { return opened ? closedir(opened) : 0; });
-  if (directory == nullptr) return 0;
+  std::error_code error;
+  std::filesystem::directory_iterator entry("/proc/self/fd", error);
+  if (error) return 0;
   uint64_t count = 0;
-  while (const dirent* const entry = readdir(directory.get())) {
-    if (entry->d_name[0] >= '0' && entry->d_name[0] <= '9') ++count;
-  }
+  for (; entry != std::filesystem::directory_iterator(); entry.increment(error)) ++count;
   // Excludes the descriptor of the directory.
   return count - 1;
 }

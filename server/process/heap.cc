@@ -4,8 +4,7 @@
 #include <unistd.h>
 
 #include <cstddef>
-#include <cstdio>
-#include <memory>
+#include <fstream>
 
 #include "server/settings/resource_limits.h"
 
@@ -30,16 +29,11 @@ void SetUpHeap() {
 }
 
 ResidentMemory ReadResidentMemory() {
-  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(
-      std::fopen("/proc/self/statm", "r"),
-      [](std::FILE* opened) { return opened != nullptr ? std::fclose(opened) : 0; });
+  std::ifstream file("/proc/self/statm");
   size_t total = 0;
   size_t resident = 0;
   size_t of_files = 0;
-  if (file == nullptr ||
-      std::fscanf(file.get(), "%zu %zu %zu", &total, &resident, &of_files) != 3) {
-    return {};
-  }
+  if (!(file >> total >> resident >> of_files)) return {};
   const auto page = static_cast<size_t>(sysconf(_SC_PAGESIZE));
   return {resident * page, (resident - of_files) * page};
 }

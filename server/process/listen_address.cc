@@ -1,6 +1,7 @@
 #include "server/process/listen_address.h"
 
 #include <absl/status/status.h>
+#include <absl/strings/numbers.h>
 #include <absl/strings/str_cat.h>
 #include <arpa/inet.h>
 #include <sys/socket.h>
@@ -8,7 +9,6 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <charconv>
 #include <cstring>
 
 #include "server/process/descriptors.h"
@@ -17,10 +17,9 @@ namespace hulld::server {
 namespace {
 
 bool IsPort(const std::string& text) {
-  int port = -1;
-  const char* end = text.data() + text.size();
-  const auto [parsed, error] = std::from_chars(text.data(), end, port);
-  return error == std::errc() && parsed == end && port >= 0 && port <= 65535;
+  uint32_t port = 0;
+  return text.find_first_not_of("0123456789") == std::string::npos &&
+         absl::SimpleAtoi(text, &port) && port <= UINT16_MAX;
 }
 
 absl::Status Malformed(const char* flag, const std::string& text, const char* why) {
