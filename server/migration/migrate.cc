@@ -4,9 +4,7 @@
 
 #include <CLI/CLI.hpp>
 #include <chrono>
-#include <filesystem>
 #include <memory>
-#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -14,10 +12,7 @@
 #include "server/contract/status_map.h"
 #include "server/migration/migration.h"
 #include "server/process/log.h"
-#include "server/store/data_directory.h"
-#include "server/store/postgres/conninfo.h"
 #include "server/store/postgres/postgres_store.h"
-#include "server/store/postgres/session.h"
 #include "server/store/rocksdb_store.h"
 
 namespace hulld::server {
@@ -50,42 +45,21 @@ absl::Status Explain(const Place& place, const absl::Status& status) {
   return Prefixed(absl::StrCat(place.Describe(), ": "), status);
 }
 
-// Opening a missing store would create it.
-absl::StatusOr<std::unique_ptr<Store>> OpenRocksDbSource(const std::string& data_dir) {
-  RocksDbOptions options;
-  options.data_dir = data_dir;
-  options.read_only = true;
-  // If the directory is inaccessible, opening the store reports the reason.
-  std::error_code error;
-  if (!std::filesystem::exists(DatabaseDirectory(data_dir), error) && !error) {
-    return absl::NotFoundError("it contains no hulld store");
-  }
-  if (absl::Status s = RocksDbStore::Open(options).status(); !s.ok()) return s;
-  options.read_only = false;
-  return RocksDbStore::Open(options);
-}
-
-absl::StatusOr<std::unique_ptr<Store>> OpenPostgresSource(const std::string& conninfo) {
-  PostgresOptions options;
-  options.conninfo = conninfo;
-  options.should_stop = [] { return true; };
-  const absl::StatusOr<Conninfo> parsed = Conninfo::Parse(conninfo);
-  if (!parsed.ok()) return parsed.status();
-  {
-    const absl::StatusOr<std::unique_ptr<Session>> session =
-        Session::Open(*parsed, options.answer_time);
-    if (!session.ok()) return session.status();
-    const absl::StatusOr<bool> has_store = HasTable(**session, "hulld.store");
-    if (!has_store.ok()) return has_store.status();
-    if (!*has_store) return absl::NotFoundError("it contains no hulld store");
-  }
-  return PostgresStore::Open(std::move(options));
-}
-
 absl::StatusOr<std::unique_ptr<Store>> OpenSource(const Place& place) {
-  if (!place.data_dir.empty()) return OpenRocksDbSource(place.data_dir);
-  const auto conninfo = ReadSecretFile(place.conninfo_file, "--from-postgres-conninfo-file");
-  return conninfo.ok() ? OpenPostgresSource(*conninfo) : conninfo.status();
+  if (!place.data_dir.empty()) {
+    RocksDbOptions options;
+    options.data_dir = place.data_dir;
+    options.read_only = true;
+    return RocksDbStore::Open(std::move(options));
+  }
+  absl::StatusOr<std::string> conninfo =
+      ReadSecretFile(place.conninfo_file, "--from-postgres-conninfo-file");
+  if (!conninfo.ok()) return conninfo.status();
+  PostgresOptions options;
+  options.conninfo = *std::move(conninfo);
+  options.must_exist = true;
+  options.should_stop = [] { return true; };
+  return PostgresStore::Open(std::move(options));
 }
 
 absl::StatusOr<std::unique_ptr<MigrationTarget>> OpenTarget(const Place& place) {

@@ -1,6 +1,5 @@
 // Opening the store: sessions, tables, and waiting to become active.
 #include <absl/status/status.h>
-#include <absl/strings/numbers.h>
 #include <absl/strings/str_cat.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
@@ -311,7 +310,11 @@ absl::Status PostgresStore::CheckServer(Session& session) {
         "--postgres-servers many requires synchronous_commit = on and fsync = on; without them an "
         "outage could revert changes that peer servers have already applied");
   }
-  return CheckFormat(session).status();
+  const absl::StatusOr<bool> exists = CheckFormat(session);
+  if (options_.must_exist && exists.ok() && !*exists) {
+    return absl::NotFoundError("the database contains no hulld store");
+  }
+  return exists.status();
 }
 
 // Atomic: a server killed in the middle leaves either all of the tables or none.

@@ -40,6 +40,8 @@ struct PostgresOptions {
   bool take_over = false;
   // Also opens a store with an unfinished migration.
   bool migrating = false;
+  // Opens only a database that contains a store.
+  bool must_exist = false;
   // Other servers may be active over the same database. Cannot be combined with take_over.
   bool shared = false;
   // Polled while this waits for the active server or for sessions; may be empty.
@@ -92,9 +94,10 @@ struct PostgresOptions {
 class PostgresStore : public Store, public PeerFeed {
  public:
   // Waits while another server is active, unless take_over. Creates the schema if it is missing.
-  // INVALID_ARGUMENT: no connection string. FAILED_PRECONDITION: another version of hulld created the
-  // schema, or the database is too old. CANCELLED: should_stop returned true. DATA_LOSS: the row of the
-  // store is missing. UNAVAILABLE: it cannot connect, or lacks a required permission.
+  // INVALID_ARGUMENT: no connection string. FAILED_PRECONDITION: the schema is in another format,
+  // or the database is too old. NOT_FOUND: must_exist, and there is no schema. CANCELLED:
+  // should_stop returned true. DATA_LOSS: the row of the store is missing. UNAVAILABLE: it cannot
+  // connect, or lacks a required permission.
   static absl::StatusOr<std::unique_ptr<PostgresStore>> Open(PostgresOptions options);
 
   ~PostgresStore() override;

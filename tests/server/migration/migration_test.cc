@@ -328,7 +328,7 @@ TEST_P(MigrationTest, AnOpenStoreIsRefused) {
 TEST_P(MigrationTest, AMissingSourceIsNotCreated) {
   Ran ran = Migrate(*from_, *to_);
   EXPECT_EQ(ran.code, 2);
-  EXPECT_THAT(ran.err, HasSubstr("it contains no hulld store"));
+  EXPECT_THAT(ran.err, HasSubstr("contains no hulld store"));
   ran = Migrate(*from_, *to_);
   EXPECT_EQ(ran.code, 2);
 }
