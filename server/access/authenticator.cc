@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "core/base/status_macros.h"
 #include "server/contract/error_info.h"
 
 namespace hulld::server {
@@ -43,8 +44,7 @@ absl::StatusOr<Caller> Authenticator::Authenticate(const Metadata& metadata, Rpc
   if (table == nullptr) return Caller();
   const auto [first, last] = metadata.equal_range(kKey);
   if (first == last) {
-    return Missing(
-        "the call has no token; send one as metadata \"authorization: Bearer TOKEN\"");
+    return Missing("the call has no token; send one as metadata \"authorization: Bearer TOKEN\"");
   }
   if (std::next(first) != last) {
     return Missing("the call has \"authorization\" twice; send one");
@@ -59,7 +59,7 @@ absl::StatusOr<Caller> Authenticator::Authenticate(const Metadata& metadata, Rpc
                                                  "ask the server's operator for a new one"),
                       v1::ERROR_REASON_TOKEN_UNKNOWN);
   }
-  if (absl::Status s = CheckPermission(*caller, rpc); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(CheckPermission(*caller, rpc));
   return *caller;
 }
 

@@ -3,6 +3,7 @@
 #include <absl/strings/escaping.h>
 #include <absl/strings/str_cat.h>
 
+#include "core/base/status_macros.h"
 #include "server/contract/error_info.h"
 #include "server/contract/hull_id.h"
 #include "server/contract/rpc.h"
@@ -38,7 +39,7 @@ absl::Status CheckPermission(const Caller& caller, Rpc rpc) {
 }
 
 absl::Status CheckHullId(const Caller& caller, const std::string& id, const std::string& field) {
-  if (absl::Status s = CheckHullIdSyntax(id, field); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(CheckHullIdSyntax(id, field));
   if (id.starts_with(caller.prefix)) return absl::OkStatus();
   return OutsidePrefix(caller, field, id);
 }

@@ -5,6 +5,7 @@
 
 #include <utility>
 
+#include "core/base/status_macros.h"
 #include "server/access/token_table.h"
 
 namespace hulld::server {
@@ -26,7 +27,7 @@ void Complain(const char* what, const absl::Status& status, std::string* complai
 
 absl::StatusOr<std::unique_ptr<Guard>> Guard::Load(const Config& config) {
   std::unique_ptr<Guard> guard(new Guard(config));
-  if (absl::Status s = guard->LoadAll(); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(guard->LoadAll());
   if (config.has_tls() || !config.tokens_file.empty()) {
     guard->watcher_ = std::thread([guard = guard.get()] { guard->Watch(); });
   }
@@ -51,7 +52,7 @@ std::shared_ptr<grpc::ServerCredentials> Guard::credentials() const {
 absl::Status Guard::LoadAll() {
   const std::lock_guard lock(mutex_);
   if (config_.has_tls()) {
-    if (absl::Status s = ReloadTls(); !s.ok()) return s;
+    HULLD_RETURN_IF_ERROR(ReloadTls());
   }
   if (!config_.tokens_file.empty()) return ReloadTokens();
   return absl::OkStatus();
@@ -103,10 +104,9 @@ void Guard::RevokeAuthorities() {
 
 absl::Status Guard::ReloadTokens() {
   const bool is_first = authenticator_.generation() == 0;
-  absl::StatusOr<TokenTable> table = ReadTokensFile(config_.tokens_file, !is_first);
-  if (!table.ok()) return table.status();
-  if (*table == tokens_) return absl::OkStatus();
-  tokens_ = *std::move(table);
+  HULLD_ASSIGN_OR_RETURN(TokenTable table, ReadTokensFile(config_.tokens_file, !is_first));
+  if (table == tokens_) return absl::OkStatus();
+  tokens_ = std::move(table);
   authenticator_.SetTokens(tokens_);
   if (tokens_.empty()) {
     spdlog::error(

@@ -15,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/status_macros.h"
 #include "server/access/secret_file.h"
 
 namespace hulld::server {
@@ -104,31 +105,24 @@ absl::StatusOr<TlsIdentity> LoadTlsIdentity(const Config& config) {
     return absl::InvalidArgumentError("--tls-cert requires --tls-key, its private key; set both");
   }
   TlsIdentity identity;
-  absl::StatusOr<std::string> certificates = ReadSettingFile(config.tls_cert, "--tls-cert");
-  if (!certificates.ok()) return certificates.status();
-  identity.certificates = *std::move(certificates);
-  const auto chain = ParseCertificates(identity.certificates, "--tls-cert", config.tls_cert);
-  if (!chain.ok()) return chain.status();
-  absl::StatusOr<std::string> key_text = ReadSecretFile(config.tls_key, "--tls-key");
-  if (!key_text.ok()) return key_text.status();
-  identity.key = *std::move(key_text);
-  const absl::StatusOr<Key> key = ParseKey(identity.key, config.tls_key);
-  if (!key.ok()) return key.status();
-  X509* const leaf = chain->front().get();
-  if (X509_check_private_key(leaf, key->get()) != 1) {
+  HULLD_ASSIGN_OR_RETURN(identity.certificates, ReadSettingFile(config.tls_cert, "--tls-cert"));
+  HULLD_ASSIGN_OR_RETURN(const auto chain,
+                         ParseCertificates(identity.certificates, "--tls-cert", config.tls_cert));
+  HULLD_ASSIGN_OR_RETURN(identity.key, ReadSecretFile(config.tls_key, "--tls-key"));
+  HULLD_ASSIGN_OR_RETURN(const Key key, ParseKey(identity.key, config.tls_key));
+  X509* const leaf = chain.front().get();
+  if (X509_check_private_key(leaf, key.get()) != 1) {
     ERR_clear_error();
     return Problem("--tls-key", config.tls_key,
                    absl::StrCat("it does not belong to the first certificate of --tls-cert ",
                                 config.tls_cert));
   }
   if (!config.tls_client_ca.empty()) {
-    absl::StatusOr<std::string> authorities =
-        ReadSettingFile(config.tls_client_ca, "--tls-client-ca");
-    if (!authorities.ok()) return authorities.status();
-    identity.client_authorities = *std::move(authorities);
-    const auto parsed =
-        ParseCertificates(identity.client_authorities, "--tls-client-ca", config.tls_client_ca);
-    if (!parsed.ok()) return parsed.status();
+    HULLD_ASSIGN_OR_RETURN(identity.client_authorities,
+                           ReadSettingFile(config.tls_client_ca, "--tls-client-ca"));
+    HULLD_RETURN_IF_ERROR(
+        ParseCertificates(identity.client_authorities, "--tls-client-ca", config.tls_client_ca)
+            .status());
   }
   identity.subject = SubjectOf(leaf);
   identity.not_before = TimeOf(X509_get0_notBefore(leaf));

@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <sstream>
 
+#include "core/base/status_macros.h"
 #include "server/access/secret_file.h"
 #include "server/contract/hull_id.h"
 #include "server/contract/status_map.h"
@@ -38,8 +39,7 @@ absl::StatusOr<std::string> ReadPrefix(const std::string& text) {
     return absl::InvalidArgumentError(absl::StrCat("the prefix \"", absl::Utf8SafeCEscape(text),
                                                    "\" must end in \"/\"; use \"*\" for all IDs"));
   }
-  const absl::Status valid = CheckHullIdSyntax(text.substr(0, text.size() - 1), "the prefix");
-  if (!valid.ok()) return valid;
+  HULLD_RETURN_IF_ERROR(CheckHullIdSyntax(text.substr(0, text.size() - 1), "the prefix"));
   return text;
 }
 
@@ -86,9 +86,7 @@ absl::Status TokenTable::AddLine(const std::string& line) {
         "the role (second word) must be read-only, read-write, or admin");
   }
   entry.caller.permission = *permission;
-  absl::StatusOr<std::string> checked = ReadPrefix(prefix);
-  if (!checked.ok()) return checked.status();
-  entry.caller.prefix = *std::move(checked);
+  HULLD_ASSIGN_OR_RETURN(entry.caller.prefix, ReadPrefix(prefix));
   const bool is_hash = hash.starts_with(kHashScheme) &&
                        hash.size() == sizeof kHashScheme - 1 + 2 * entry.hash.size() &&
                        IsHex(hash.substr(sizeof kHashScheme - 1));
@@ -135,9 +133,8 @@ bool TokenTable::Knows(const Caller& caller) const {
 
 absl::StatusOr<TokenTable> ReadTokensFile(const std::string& path, bool may_be_empty) {
   if (may_be_empty && IsMissing(path)) return TokenTable();
-  const absl::StatusOr<std::string> text = ReadSecretFile(path, "--tokens-file");
-  if (!text.ok()) return text.status();
-  absl::StatusOr<TokenTable> table = TokenTable::Parse(*text);
+  HULLD_ASSIGN_OR_RETURN(const std::string text, ReadSecretFile(path, "--tokens-file"));
+  absl::StatusOr<TokenTable> table = TokenTable::Parse(text);
   if (!table.ok()) return Prefixed(absl::StrCat("--tokens-file ", path, ": "), table.status());
   if (table->empty() && !may_be_empty) {
     return absl::InvalidArgumentError(absl::StrCat(

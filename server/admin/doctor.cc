@@ -9,6 +9,7 @@
 #include <memory>
 #include <utility>
 
+#include "core/base/status_macros.h"
 #include "core/hull/audit.h"
 #include "core/hull/growth/hull_builder.h"
 #include "server/process/log.h"
@@ -40,10 +41,9 @@ struct Report {
 };
 
 absl::Status Examine(RocksDbStore& store, const StoredHull& stored) {
-  const absl::StatusOr<std::vector<Vector>> points = store.LoadVertices(stored);
-  if (!points.ok()) return points.status();
+  HULLD_ASSIGN_OR_RETURN(const std::vector<Vector> points, store.LoadVertices(stored));
   const absl::StatusOr<std::unique_ptr<HullBuilder>> builder =
-      BuildHull(stored.record, *points, /*should_stop=*/{});
+      BuildHull(stored.record, points, /*should_stop=*/{});
   return builder.ok() ? AuditHull((*builder)->Snapshot()) : builder.status();
 }
 

@@ -15,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/status_macros.h"
 #include "server/call/pulled_stream.h"
 #include "server/contract/error_info.h"
 #include "server/settings/config.h"
@@ -60,9 +61,7 @@ class BackupStream : public RequestStream<PulledStream<WriteReactor, v1::SaveBac
 
   // Makes the copy, and the first message.
   absl::Status Begin() {
-    absl::StatusOr<std::string> directory = store_.MakeCopy();
-    if (!directory.ok()) return directory.status();
-    directory_ = *std::move(directory);
+    HULLD_ASSIGN_OR_RETURN(directory_, store_.MakeCopy());
     std::error_code error;
     for (auto entry = std::filesystem::recursive_directory_iterator(directory_, error);
          !error && entry != std::filesystem::recursive_directory_iterator();

@@ -6,6 +6,7 @@
 #include <iterator>
 #include <utility>
 
+#include "core/base/status_macros.h"
 #include "server/access/authenticator.h"
 #include "server/call/error_details.h"
 #include "server/call/request_id.h"
@@ -54,13 +55,13 @@ absl::Status Call::Begin(std::function<void()> on_revoked) {
   }
   const Authenticator* const authenticator = admission_.authenticator();
   const uint64_t generation = authenticator == nullptr ? 0 : authenticator->generation();
-  if (absl::Status s = Authenticate(); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(Authenticate());
 
   const std::optional<PeerAddress> peer = PeerAddress::FromGrpc(peer_);
-  absl::StatusOr<Admission::Ticket> ticket = admission_.Admit(
-      {rpc_, Client(peer), peer, context_.c_call(), caller_, &lifetime_, std::move(on_revoked)});
-  if (!ticket.ok()) return ticket.status();
-  ticket_.emplace(*std::move(ticket));
+  HULLD_ASSIGN_OR_RETURN(Admission::Ticket ticket,
+                         admission_.Admit({rpc_, Client(peer), peer, context_.c_call(), caller_,
+                                           &lifetime_, std::move(on_revoked)}));
+  ticket_.emplace(std::move(ticket));
   // The tokens may have changed before the call was registered as running.
   if (authenticator != nullptr && authenticator->generation() != generation &&
       !caller_.name.empty() && !authenticator->Knows(caller_)) {
@@ -81,10 +82,8 @@ absl::Status Call::Authenticate() {
   if (admission_.authenticator() == nullptr || PermissionFor(rpc_) == Permission::kNone) {
     return absl::OkStatus();
   }
-  absl::StatusOr<Caller> caller =
-      admission_.authenticator()->Authenticate(context_.client_metadata(), rpc_);
-  if (!caller.ok()) return caller.status();
-  caller_ = *std::move(caller);
+  HULLD_ASSIGN_OR_RETURN(
+      caller_, admission_.authenticator()->Authenticate(context_.client_metadata(), rpc_));
   return absl::OkStatus();
 }
 

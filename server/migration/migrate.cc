@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/status_macros.h"
 #include "server/access/secret_file.h"
 #include "server/contract/status_map.h"
 #include "server/migration/migration.h"
@@ -52,11 +53,9 @@ absl::StatusOr<std::unique_ptr<Store>> OpenSource(const Place& place) {
     options.read_only = true;
     return RocksDbStore::Open(std::move(options));
   }
-  absl::StatusOr<std::string> conninfo =
-      ReadSecretFile(place.conninfo_file, "--from-postgres-conninfo-file");
-  if (!conninfo.ok()) return conninfo.status();
   PostgresOptions options;
-  options.conninfo = *std::move(conninfo);
+  HULLD_ASSIGN_OR_RETURN(options.conninfo,
+                         ReadSecretFile(place.conninfo_file, "--from-postgres-conninfo-file"));
   options.must_exist = true;
   options.should_stop = [] { return true; };
   return PostgresStore::Open(std::move(options));
@@ -64,8 +63,9 @@ absl::StatusOr<std::unique_ptr<Store>> OpenSource(const Place& place) {
 
 absl::StatusOr<std::unique_ptr<MigrationTarget>> OpenTarget(const Place& place) {
   if (!place.data_dir.empty()) return OpenRocksDbTarget(place.data_dir);
-  const auto conninfo = ReadSecretFile(place.conninfo_file, "--to-postgres-conninfo-file");
-  return conninfo.ok() ? OpenPostgresTarget(*conninfo) : conninfo.status();
+  HULLD_ASSIGN_OR_RETURN(const std::string conninfo,
+                         ReadSecretFile(place.conninfo_file, "--to-postgres-conninfo-file"));
+  return OpenPostgresTarget(conninfo);
 }
 
 // Prints progress at intervals.
@@ -135,7 +135,7 @@ absl::Status Run(const Place& from, const Place& to, std::ostream& out, std::ost
     // Points that change no vertex do not raise the store's revision, so the source may have
     // changed unnoticed since the earlier run.
     out << std::string(compared.message()) << "; starting the copy over" << std::endl;
-    if (absl::Status s = (*target)->Begin(migration->source()); !s.ok()) return s;
+    HULLD_RETURN_IF_ERROR((*target)->Begin(migration->source()));
     lines.SetPhase("copied");
     counts = migration->CopyTo(**target);
     if (!counts.ok()) return counts.status();
@@ -143,7 +143,7 @@ absl::Status Run(const Place& from, const Place& to, std::ostream& out, std::ost
     compared = CompareReopened(to, *migration, &target);
   }
   if (!compared.ok()) return compared;
-  if (absl::Status s = (*target)->Finish(migration->source()); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR((*target)->Finish(migration->source()));
   out << "verified: all records match; " << to.Describe() << " is now store "
       << (*target)->store().id() << "\n";
   return absl::OkStatus();

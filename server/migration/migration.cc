@@ -8,6 +8,8 @@
 #include <optional>
 #include <utility>
 
+#include "core/base/status_macros.h"
+
 namespace hulld::server {
 namespace {
 
@@ -59,7 +61,7 @@ absl::Status CompareAll(const std::vector<Stored>& expected, const std::vector<S
     const std::string& id = IdOf(expected[i]);
     if (i >= found.size() || id < IdOf(found[i])) return Differs(id, "it is missing");
     if (IdOf(found[i]) < id) return Differs(IdOf(found[i]), "it is not in the source");
-    if (absl::Status s = same(expected[i], found[i]); !s.ok()) return s;
+    HULLD_RETURN_IF_ERROR(same(expected[i], found[i]));
   }
   if (found.size() <= expected.size()) return absl::OkStatus();
   return Differs(IdOf(found[expected.size()]), "it is not in the source");
@@ -120,14 +122,13 @@ absl::StatusOr<Migration> Migration::Read(Store& source, Progress progress) {
 // Resumes an unfinished migration if it copied the current state of this source. Restarts one that
 // copied an earlier state.
 absl::Status Migration::Prepare(MigrationTarget& target) {
-  const absl::StatusOr<std::optional<MigrationSource>> mark = target.ReadMark();
-  if (!mark.ok()) return mark.status();
-  if (mark->has_value()) {
-    if (**mark == as_of_) return absl::OkStatus();
-    if ((*mark)->store_id == as_of_.store_id) return target.Begin(as_of_);
+  HULLD_ASSIGN_OR_RETURN(const std::optional<MigrationSource> mark, target.ReadMark());
+  if (mark.has_value()) {
+    if (*mark == as_of_) return absl::OkStatus();
+    if (mark->store_id == as_of_.store_id) return target.Begin(as_of_);
     return absl::FailedPreconditionError(
-        absl::StrCat("the destination contains an unfinished migration from store ",
-                     (*mark)->store_id, ", but the source is store ", as_of_.store_id,
+        absl::StrCat("the destination contains an unfinished migration from store ", mark->store_id,
+                     ", but the source is store ", as_of_.store_id,
                      "; use that source, or another destination"));
   }
   uint64_t held = 0;
@@ -143,9 +144,8 @@ absl::Status Migration::Prepare(MigrationTarget& target) {
 
 absl::StatusOr<MigrationCounts> Migration::CopyTo(MigrationTarget& target) {
   MigrationCounts counts;
-  if (absl::Status s = Prepare(target); !s.ok()) return s;
-  const absl::StatusOr<LastCopied> last = FindLastCopied(target.store());
-  if (!last.ok()) return last.status();
+  HULLD_RETURN_IF_ERROR(Prepare(target));
+  HULLD_ASSIGN_OR_RETURN(const LastCopied last, FindLastCopied(target.store()));
   Batch batch(target);
   const auto copy = [&](const auto& records, const std::string& last_id,
                         uint64_t* count) -> absl::Status {
@@ -155,15 +155,14 @@ absl::StatusOr<MigrationCounts> Migration::CopyTo(MigrationTarget& target) {
         ++counts.resumed;
         continue;
       }
-      absl::StatusOr<std::vector<Change>> changes = ChangesOf(each);
-      if (!changes.ok()) return changes.status();
-      if (absl::Status s = batch.Add(*std::move(changes)); !s.ok()) return s;
+      HULLD_ASSIGN_OR_RETURN(std::vector<Change> changes, ChangesOf(each));
+      HULLD_RETURN_IF_ERROR(batch.Add(std::move(changes)));
       progress_(counts.hulls + counts.bodies, all());
     }
     return batch.Flush();
   };
-  if (absl::Status s = copy(hulls_, last->hull_id, &counts.hulls); !s.ok()) return s;
-  if (absl::Status s = copy(bodies_, last->body_id, &counts.bodies); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(copy(hulls_, last.hull_id, &counts.hulls));
+  HULLD_RETURN_IF_ERROR(copy(bodies_, last.body_id, &counts.bodies));
   return counts;
 }
 
@@ -177,23 +176,21 @@ absl::StatusOr<std::vector<Change>> Migration::ChangesOf(const StoredBody& body)
 
 // Returns the state of a hull as changes: all vertices as one base, and each writer.
 absl::StatusOr<std::vector<Change>> Migration::ChangesOf(const StoredHull& hull) const {
-  absl::StatusOr<std::vector<Vector>> vertices = source_->LoadVertices(hull);
-  if (!vertices.ok()) return vertices.status();
-  absl::StatusOr<std::vector<WriterSequence>> writers = ReadWriters(*source_, hull);
-  if (!writers.ok()) return writers.status();
+  HULLD_ASSIGN_OR_RETURN(std::vector<Vector> vertices, source_->LoadVertices(hull));
+  HULLD_ASSIGN_OR_RETURN(std::vector<WriterSequence> writers, ReadWriters(*source_, hull));
   Change change;
   change.hull = hull;
   change.hull.layout = {};
   change.revision = hull.record.revision;
   change.begins = true;
-  if (!vertices->empty()) {
+  if (!vertices.empty()) {
     change.hull.layout.base_revision = hull.record.revision;
-    change.hull.layout.base_vertices = vertices->size();
+    change.hull.layout.base_vertices = vertices.size();
     change.vertex_change = VertexChange::kReplaced;
-    change.vertices = *std::move(vertices);
+    change.vertices = std::move(vertices);
   }
   std::vector<Change> changes = {std::move(change)};
-  for (WriterSequence& writer : *writers) {
+  for (WriterSequence& writer : writers) {
     Change committed;
     committed.hull = changes.front().hull;
     committed.revision = hull.record.revision;
@@ -205,16 +202,15 @@ absl::StatusOr<std::vector<Change>> Migration::ChangesOf(const StoredHull& hull)
 }
 
 absl::Status Migration::Compare(Store& copy) const {
-  const absl::StatusOr<Migration> read = Read(copy, progress_);
-  if (!read.ok()) return read.status();
+  HULLD_ASSIGN_OR_RETURN(const Migration read, Read(copy, progress_));
   uint64_t done = 0;
   absl::Status status =
-      CompareAll(hulls_, read->hulls_, [&](const StoredHull& hull, const StoredHull& other) {
+      CompareAll(hulls_, read.hulls_, [&](const StoredHull& hull, const StoredHull& other) {
         progress_(++done, all());
         return CompareHull(copy, hull, other);
       });
   if (!status.ok()) return status;
-  return CompareAll(bodies_, read->bodies_, [&](const StoredBody& body, const StoredBody& other) {
+  return CompareAll(bodies_, read.bodies_, [&](const StoredBody& body, const StoredBody& other) {
     progress_(++done, all());
     return EncodeStoredBody(body) == EncodeStoredBody(other)
                ? absl::OkStatus()
@@ -228,16 +224,13 @@ absl::Status Migration::CompareHull(Store& copy, const StoredHull& hull,
   if (!(hull.record == other.record) || hull.writer_count != other.writer_count) {
     return Differs(id, "its record");
   }
-  const absl::StatusOr<std::vector<Vector>> vertices = source_->LoadVertices(hull);
-  if (!vertices.ok()) return vertices.status();
-  const absl::StatusOr<std::vector<Vector>> copied = copy.LoadVertices(other);
-  if (!copied.ok()) return copied.status();
-  if (!std::ranges::equal(*vertices, *copied, HasSameBits)) return Differs(id, "its vertices");
-  const absl::StatusOr<std::vector<WriterSequence>> writers = ReadWriters(*source_, hull);
-  if (!writers.ok()) return writers.status();
-  const absl::StatusOr<std::vector<WriterSequence>> copied_writers = ReadWriters(copy, other);
-  if (!copied_writers.ok()) return copied_writers.status();
-  return *writers == *copied_writers ? absl::OkStatus() : Differs(id, "its writers' sequences");
+  HULLD_ASSIGN_OR_RETURN(const std::vector<Vector> vertices, source_->LoadVertices(hull));
+  HULLD_ASSIGN_OR_RETURN(const std::vector<Vector> copied, copy.LoadVertices(other));
+  if (!std::ranges::equal(vertices, copied, HasSameBits)) return Differs(id, "its vertices");
+  HULLD_ASSIGN_OR_RETURN(const std::vector<WriterSequence> writers, ReadWriters(*source_, hull));
+  HULLD_ASSIGN_OR_RETURN(const std::vector<WriterSequence> copied_writers,
+                         ReadWriters(copy, other));
+  return writers == copied_writers ? absl::OkStatus() : Differs(id, "its writers' sequences");
 }
 
 }  // namespace hulld::server

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/status_macros.h"
 #include "server/migration/migration_target.h"
 #include "server/store/postgres/batch_statements.h"
 #include "server/store/postgres/conninfo.h"
@@ -39,14 +40,12 @@ class PostgresTarget : public MigrationTarget {
   Store& store() override { return *store_; }
 
   absl::StatusOr<std::optional<MigrationSource>> ReadMark() override {
-    const absl::StatusOr<bool> is_marked = HasTable(*session_, "hulld.migration");
-    if (!is_marked.ok()) return is_marked.status();
-    if (!*is_marked) return std::nullopt;
-    const absl::StatusOr<Rows> rows =
-        session_->Ask({.text = "SELECT store_id, revision FROM hulld.migration"});
-    if (!rows.ok()) return rows.status();
-    if (rows->count() != 1) return absl::DataLossError("the row of hulld.migration is missing");
-    return MigrationSource{std::string(rows->at(0, 0)), rows->bigint(0, 1)};
+    HULLD_ASSIGN_OR_RETURN(const bool is_marked, HasTable(*session_, "hulld.migration"));
+    if (!is_marked) return std::nullopt;
+    HULLD_ASSIGN_OR_RETURN(
+        const Rows rows, session_->Ask({.text = "SELECT store_id, revision FROM hulld.migration"}));
+    if (rows.count() != 1) return absl::DataLossError("the row of hulld.migration is missing");
+    return MigrationSource{std::string(rows.at(0, 0)), rows.bigint(0, 1)};
   }
 
   absl::Status Begin(const MigrationSource& source) override {
@@ -104,20 +103,16 @@ class PostgresTarget : public MigrationTarget {
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<MigrationTarget>> OpenPostgresTarget(const std::string& conninfo) {
-  const absl::StatusOr<Conninfo> parsed = Conninfo::Parse(conninfo);
-  if (!parsed.ok()) return parsed.status();
+  HULLD_ASSIGN_OR_RETURN(const Conninfo parsed, Conninfo::Parse(conninfo));
   PostgresOptions options;
   options.conninfo = conninfo;
   options.migrating = true;
   options.should_stop = [] { return true; };
-  absl::StatusOr<std::unique_ptr<PostgresStore>> store = PostgresStore::Open(std::move(options));
-  if (!store.ok()) return store.status();
-  absl::StatusOr<std::unique_ptr<Session>> session = Session::Open(*parsed, kAnswerTime);
-  if (!session.ok()) return session.status();
-  const absl::Status prepared =
-      (*session)->Run(absl::StrCat(kPrepare, PrepareBatchStatements())).status();
-  if (!prepared.ok()) return prepared;
-  return std::make_unique<PostgresTarget>(*std::move(store), *std::move(session));
+  HULLD_ASSIGN_OR_RETURN(std::unique_ptr<PostgresStore> store,
+                         PostgresStore::Open(std::move(options)));
+  HULLD_ASSIGN_OR_RETURN(std::unique_ptr<Session> session, Session::Open(parsed, kAnswerTime));
+  HULLD_RETURN_IF_ERROR(session->Run(absl::StrCat(kPrepare, PrepareBatchStatements())).status());
+  return std::make_unique<PostgresTarget>(std::move(store), std::move(session));
 }
 
 }  // namespace hulld::server

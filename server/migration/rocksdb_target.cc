@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "core/base/status_macros.h"
 #include "server/migration/migration_target.h"
 #include "server/store/change_encoding.h"
 #include "server/store/rocksdb_store.h"
@@ -17,14 +18,12 @@ class RocksDbTarget : public MigrationTarget {
   Store& store() override { return *store_; }
 
   absl::StatusOr<std::optional<MigrationSource>> ReadMark() override {
-    const absl::StatusOr<std::optional<std::string>> mark = store_->ReadMigrationMark();
-    if (!mark.ok()) return mark.status();
-    if (!mark->has_value()) return std::nullopt;
-    const std::string& value = **mark;
+    HULLD_ASSIGN_OR_RETURN(const std::optional<std::string> mark, store_->ReadMigrationMark());
+    if (!mark.has_value()) return std::nullopt;
+    const std::string& value = *mark;
     const size_t bytes = EncodeNumber(0).size();
-    const absl::StatusOr<uint64_t> revision = DecodeNumber(value.substr(0, bytes));
-    if (!revision.ok()) return revision.status();
-    return MigrationSource{value.substr(bytes), *revision};
+    HULLD_ASSIGN_OR_RETURN(const uint64_t revision, DecodeNumber(value.substr(0, bytes)));
+    return MigrationSource{value.substr(bytes), revision};
   }
 
   absl::Status Begin(const MigrationSource& source) override {
@@ -59,9 +58,9 @@ absl::StatusOr<std::unique_ptr<MigrationTarget>> OpenRocksDbTarget(const std::st
   RocksDbOptions options;
   options.data_dir = data_dir;
   options.migrating = true;
-  absl::StatusOr<std::unique_ptr<RocksDbStore>> store = RocksDbStore::Open(std::move(options));
-  if (!store.ok()) return store.status();
-  return std::make_unique<RocksDbTarget>(*std::move(store));
+  HULLD_ASSIGN_OR_RETURN(std::unique_ptr<RocksDbStore> store,
+                         RocksDbStore::Open(std::move(options)));
+  return std::make_unique<RocksDbTarget>(std::move(store));
 }
 
 }  // namespace hulld::server

@@ -14,6 +14,7 @@
 #include <thread>
 #include <utility>
 
+#include "core/base/status_macros.h"
 #include "server/process/listen_address.h"
 
 namespace hulld::server {
@@ -147,13 +148,12 @@ class MetricsEndpoint::Listener {
 };
 
 absl::StatusOr<ListenAddress> ParseMetricsAddress(const std::string& address, bool exposed) {
-  absl::StatusOr<ListenAddress> parsed = ParseListenAddress(address, kFlag);
-  if (!parsed.ok()) return parsed.status();
-  if (parsed->is_unix()) {
+  HULLD_ASSIGN_OR_RETURN(ListenAddress parsed, ParseListenAddress(address, kFlag));
+  if (parsed.is_unix()) {
     return absl::InvalidArgumentError(
         absl::StrCat(kFlag, " is \"", address, "\": it must be a TCP address, host:port"));
   }
-  if (!parsed->is_local() && !exposed) {
+  if (!parsed.is_local() && !exposed) {
     return absl::InvalidArgumentError(absl::StrCat(
         kFlag, " is \"", address,
         "\", which is reachable from other machines, and metrics are neither ",
@@ -169,13 +169,11 @@ MetricsEndpoint::~MetricsEndpoint() = default;
 absl::StatusOr<std::unique_ptr<MetricsEndpoint>> MetricsEndpoint::Start(const std::string& address,
                                                                         bool exposed,
                                                                         const Metrics& metrics) {
-  const absl::StatusOr<ListenAddress> parsed = ParseMetricsAddress(address, exposed);
-  if (!parsed.ok()) return parsed.status();
+  HULLD_ASSIGN_OR_RETURN(const ListenAddress parsed, ParseMetricsAddress(address, exposed));
   std::unique_ptr<MetricsEndpoint> endpoint(
       new MetricsEndpoint(std::make_unique<Listener>(metrics)));
-  const absl::StatusOr<int> port = endpoint->listener_->Listen(*parsed);
-  if (!port.ok()) return port.status();
-  endpoint->address_ = parsed->Format(*port);
+  HULLD_ASSIGN_OR_RETURN(const int port, endpoint->listener_->Listen(parsed));
+  endpoint->address_ = parsed.Format(port);
   return endpoint;
 }
 

@@ -14,6 +14,7 @@
 #include <memory>
 #include <utility>
 
+#include "core/base/status_macros.h"
 #include "server/contract/status_map.h"
 #include "server/process/random_id.h"
 #include "server/store/change_encoding.h"
@@ -60,12 +61,12 @@ absl::StatusOr<std::unique_ptr<RocksDbStore>> RocksDbStore::Open(RocksDbOptions 
   }
   std::unique_ptr<RocksDbStore> store(new RocksDbStore(std::move(options)));
   const bool read_only = store->options_.read_only;
-  if (absl::Status s = read_only ? store->Lock() : store->MakeDirectories(); !s.ok()) return s;
-  if (absl::Status s = store->OpenDbInRoom(); !s.ok()) return s;
-  if (absl::Status s = store->ReadMeta(); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(read_only ? store->Lock() : store->MakeDirectories());
+  HULLD_RETURN_IF_ERROR(store->OpenDbInRoom());
+  HULLD_RETURN_IF_ERROR(store->ReadMeta());
   if (read_only) return store;
   ClearScratch(store->options_.data_dir);
-  if (absl::Status s = store->StartMark(); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(store->StartMark());
   store->syncer_ = std::thread([raw = store.get()] { raw->SyncAtIntervals(); });
   return store;
 }
@@ -227,12 +228,12 @@ absl::Status RocksDbStore::CheckLogs() {
   }
   if (!mark.ok()) return mark.status();
   if (!mark->has_value()) return absl::OkStatus();
-  const absl::StatusOr<std::optional<LostLog>> lost = FindLostLog(*files_, directory, **mark);
-  if (!lost.ok()) return lost.status();
+  HULLD_ASSIGN_OR_RETURN(const std::optional<LostLog> lost,
+                         FindLostLog(*files_, directory, **mark));
   if (options_.accept_loss) {
-    return lost->has_value() ? DropLogsFrom((*lost)->number + 1) : absl::OkStatus();
+    return lost.has_value() ? DropLogsFrom(lost->number + 1) : absl::OkStatus();
   }
-  if (lost->has_value()) return LogLost(options_.data_dir, (*lost)->finding, (*mark)->revision);
+  if (lost.has_value()) return LogLost(options_.data_dir, lost->finding, (*mark)->revision);
   if (options_.read_only) return absl::OkStatus();
   const rocksdb::IOStatus resumed = files_->ResumeMark(path, *std::move(*mark));
   return resumed.ok() ? absl::OkStatus() : OpenError(resumed, options_.data_dir, false);
@@ -273,7 +274,7 @@ absl::Status RocksDbStore::ReadMeta() {
           absl::StrCat("--data-dir ", options_.data_dir, " contains no hulld store"));
     }
     if (!failure_.ok()) return failure_;
-    if (absl::Status s = InitializeMeta(); !s.ok()) return s;
+    HULLD_RETURN_IF_ERROR(InitializeMeta());
     return BeginRun();
   }
   if (**format != kStoreFormat) {
@@ -294,7 +295,7 @@ absl::Status RocksDbStore::ReadMeta() {
   if (!revision->has_value()) return absl::DataLossError("the store's revision is missing");
   revision_ = **revision;
   if (options_.read_only) return absl::OkStatus();
-  if (absl::Status s = BeginRun(); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(BeginRun());
   return failure_.ok() ? DropLostIncarnations() : absl::OkStatus();
 }
 
@@ -331,7 +332,7 @@ absl::Status RocksDbStore::BeginRun() {
   if (!relaxed && cut_short) batch.Delete(kRelaxedKey);
   if (batch.Count() > 0) {
     if (!failure_.ok()) return failure_;
-    if (absl::Status s = WriteMeta(&batch); !s.ok()) return s;
+    HULLD_RETURN_IF_ERROR(WriteMeta(&batch));
   }
   relaxed_run_ = relaxed;
   if (restored &&
@@ -352,7 +353,7 @@ absl::Status RocksDbStore::BeginRun() {
 
 // Syncs the log, then removes the mark. If that fails, the mark stays.
 absl::Status RocksDbStore::EndRelaxedRun() {
-  if (absl::Status s = SyncLog(); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(SyncLog());
   rocksdb::WriteBatch batch;
   batch.Delete(kRelaxedKey);
   return WriteMeta(&batch);

@@ -4,6 +4,7 @@
 
 #include <utility>
 
+#include "core/base/status_macros.h"
 #include "server/store/rocksdb_store.h"
 #include "server/store/sealed_hull.h"
 #include "server/store/store_errors.h"
@@ -35,9 +36,8 @@ absl::StatusOr<std::optional<std::string>> RocksDbStore::Read(const std::string&
   }
   if (status.IsNotFound()) return std::nullopt;
   if (!status.ok()) return ReadFailed(status);
-  const absl::StatusOr<std::string_view> value = Unseal(key, sealed);
-  if (!value.ok()) return value.status();
-  return std::string(*value);
+  HULLD_ASSIGN_OR_RETURN(const std::string_view value, Unseal(key, sealed));
+  return std::string(value);
 }
 
 // Bypasses the block cache, where the blocks of a scan would evict each other before reuse. The
@@ -59,12 +59,9 @@ void RocksDbStore::FindValues(std::span<const std::string> keys,
 }
 
 absl::StatusOr<std::optional<uint64_t>> RocksDbStore::ReadNumber(const std::string& key) {
-  const absl::StatusOr<std::optional<std::string>> value = Read(key);
-  if (!value.ok()) return value.status();
-  if (!value->has_value()) return std::nullopt;
-  const absl::StatusOr<uint64_t> number = DecodeNumber(**value);
-  if (!number.ok()) return number.status();
-  return *number;
+  HULLD_ASSIGN_OR_RETURN(const std::optional<std::string> value, Read(key));
+  if (!value.has_value()) return std::nullopt;
+  return DecodeNumber(*value);
 }
 
 // Visits the keys from begin to end and their sealed values.
@@ -86,7 +83,7 @@ absl::Status RocksDbStore::ScanRange(
     options.iterate_upper_bound = &upper_bound;
     const std::unique_ptr<rocksdb::Iterator> iterator(db_->NewIterator(options));
     for (iterator->Seek(next); iterator->Valid(); iterator->Next()) {
-      if (absl::Status s = visit(View(iterator->key()), View(iterator->value())); !s.ok()) return s;
+      HULLD_RETURN_IF_ERROR(visit(View(iterator->key()), View(iterator->value())));
       next.assign(iterator->key().data(), iterator->key().size());
       next.push_back('\0');
     }
@@ -168,7 +165,7 @@ absl::Status RocksDbStore::LoadBase(const StoredHull& hull, VertexAssembly* asse
     } else if (value->has_value()) {
       part = **value;
     }
-    if (absl::Status s = assembly->AddBasePart(part); !s.ok()) return s;
+    HULLD_RETURN_IF_ERROR(assembly->AddBasePart(part));
   }
   return absl::OkStatus();
 }
@@ -195,14 +192,14 @@ absl::StatusOr<std::vector<WriterSequence>> RocksDbStore::LoadWriters(const Stor
   const uint64_t incarnation = hull.record.create_revision;
   const std::string begin = IncarnationKey(kWriterPrefix, incarnation);
   std::vector<WriterSequence> writers;
-  const absl::Status status = ScanRange(
-      begin, IncarnationKey(kWriterPrefix, incarnation + 1),
-      [&](std::string_view key, std::string_view sealed) -> absl::Status {
-        const absl::StatusOr<uint64_t> sequence = UnsealSequence(hull.record.hull_id, key, sealed);
-        if (!sequence.ok()) return sequence.status();
-        writers.push_back({std::string(key.substr(begin.size())), *sequence});
-        return absl::OkStatus();
-      });
+  const absl::Status status =
+      ScanRange(begin, IncarnationKey(kWriterPrefix, incarnation + 1),
+                [&](std::string_view key, std::string_view sealed) -> absl::Status {
+                  HULLD_ASSIGN_OR_RETURN(const uint64_t sequence,
+                                         UnsealSequence(hull.record.hull_id, key, sealed));
+                  writers.push_back({std::string(key.substr(begin.size())), sequence});
+                  return absl::OkStatus();
+                });
   if (!status.ok()) return status;
   return writers;
 }

@@ -14,6 +14,7 @@
 #include <unordered_set>
 #include <utility>
 
+#include "core/base/status_macros.h"
 #include "server/process/random_id.h"
 #include "server/store/change_encoding.h"
 #include "server/store/data_directory.h"
@@ -88,7 +89,7 @@ absl::Status RocksDbStore::Commit(std::span<Change* const> changes) {
   const std::shared_lock lock(db_mutex_);
   const std::lock_guard log_lock(log_mutex_);
   if (!failure_.ok()) return failure_;
-  if (absl::Status s = CheckRoom(changes); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(CheckRoom(changes));
   const rocksdb::Status status = db_->Write(options, &batch);
   if (status.ok()) {
     files_->Commit(revision, options.sync);

@@ -12,6 +12,8 @@
 #include <iterator>
 #include <limits>
 
+#include "core/base/status_macros.h"
+
 namespace hulld::server {
 namespace {
 
@@ -166,19 +168,17 @@ absl::StatusOr<std::optional<LostLog>> FindLostLog(rocksdb::FileSystem& files,
                                                    const std::string& directory,
                                                    const LogMark& mark) {
   for (const auto& [number, synced] : mark.logs) {
-    absl::StatusOr<std::string> finding = Compare(files, LogPath(directory, number), synced);
-    if (!finding.ok()) return finding.status();
-    if (!finding->empty()) return LostLog{number, *std::move(finding)};
+    HULLD_ASSIGN_OR_RETURN(std::string finding, Compare(files, LogPath(directory, number), synced));
+    if (!finding.empty()) return LostLog{number, std::move(finding)};
   }
   return std::nullopt;
 }
 
 absl::StatusOr<std::optional<LogMark>> LogMarkFile::Read(rocksdb::FileSystem& files,
                                                          const std::string& path) {
-  absl::StatusOr<std::optional<Decoded>> newest = ReadNewest(files, path);
-  if (!newest.ok()) return newest.status();
-  if (!newest->has_value()) return std::nullopt;
-  return std::move((*newest)->mark);
+  HULLD_ASSIGN_OR_RETURN(std::optional<Decoded> newest, ReadNewest(files, path));
+  if (!newest.has_value()) return std::nullopt;
+  return std::move(newest->mark);
 }
 
 IOStatus LogMarkFile::Open(rocksdb::FileSystem& files, const std::string& path, const LogMark& mark,

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "core/base/check.h"
+#include "core/base/status_macros.h"
 
 namespace hulld::server {
 namespace {
@@ -80,15 +81,13 @@ void BatchNotices::Run() {
 
 // Listens and sends until the session is lost or the thread must end.
 absl::Status BatchNotices::Serve() {
-  absl::StatusOr<std::unique_ptr<Session>> opened = open_();
-  if (!opened.ok()) return opened.status();
-  Session& session = **opened;
-  if (absl::Status s = session.Run(kListen).status(); !s.ok()) return s;
+  HULLD_ASSIGN_OR_RETURN(const std::unique_ptr<Session> opened, open_());
+  Session& session = *opened;
+  HULLD_RETURN_IF_ERROR(session.Run(kListen).status());
   // From here on, each later batch arrives as a notice.
-  const absl::StatusOr<uint64_t> last = LastBatch(session);
-  if (!last.ok()) return last.status();
+  HULLD_ASSIGN_OR_RETURN(const uint64_t last, LastBatch(session));
   is_listening_ = true;
-  Hear(*last);
+  Hear(last);
   Clock::time_point next = Clock::now();
   while (true) {
     // Cleared before the conditions are checked, so later events wake the thread again.
@@ -96,8 +95,7 @@ absl::Status BatchNotices::Serve() {
     if (ending_) return absl::OkStatus();
     const uint64_t batch = to_send_;
     if (batch != sent_ && Clock::now() >= next) {
-      const absl::Status sent = session.Run(absl::StrCat(kNotify, ", '", batch, "'")).status();
-      if (!sent.ok()) return sent;
+      HULLD_RETURN_IF_ERROR(session.Run(absl::StrCat(kNotify, ", '", batch, "'")).status());
       sent_ = batch;
       next = Clock::now() + kMinPause;
     }
@@ -107,7 +105,7 @@ absl::Status BatchNotices::Serve() {
       if (absl::SimpleAtoi(payload, &heard)) Hear(heard);
     }
     const auto longest = to_send_ == sent_ ? kForEver : UpTo(next);
-    if (absl::Status s = session.AwaitNotices(wake_, longest); !s.ok()) return s;
+    HULLD_RETURN_IF_ERROR(session.AwaitNotices(wake_, longest));
   }
 }
 

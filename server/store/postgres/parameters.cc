@@ -1,5 +1,7 @@
 #include "server/store/postgres/parameters.h"
 
+#include <absl/strings/str_cat.h>
+
 #include <utility>
 
 namespace hulld::server {
@@ -13,12 +15,9 @@ void ArrayParameter::Add(std::string_view value) {
 // Header: number of dimensions, null flag, element type; then, per dimension, its length and its
 // first index. Source: array_recv in PostgreSQL's utils/adt/arrayfuncs.c.
 std::string ArrayParameter::Take() {
-  std::string array = EncodeInteger(1) + EncodeInteger(0) +
-                      EncodeInteger(static_cast<uint32_t>(element_)) + EncodeInteger(count_) +
-                      EncodeInteger(1);
-  array += std::exchange(elements_, {});
-  count_ = 0;
-  return array;
+  return absl::StrCat(
+      EncodeInteger(1), EncodeInteger(0), EncodeInteger(static_cast<uint32_t>(element_)),
+      EncodeInteger(std::exchange(count_, 0)), EncodeInteger(1), std::exchange(elements_, {}));
 }
 
 }  // namespace hulld::server

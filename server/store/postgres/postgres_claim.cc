@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/base/status_macros.h"
 #include "server/store/postgres/postgres_store.h"
 #include "server/store/store_errors.h"
 
@@ -23,10 +24,9 @@ constexpr int kBeatsPerMeasure = 10;
 absl::StatusOr<bool> PostgresStore::CheckFormat(Session& session) const {
   const absl::StatusOr<bool> exists = HasTable(session, "hulld.store");
   if (!exists.ok() || !*exists) return exists;
-  const absl::StatusOr<uint64_t> number =
-      OnlyNumber(session.Run("SELECT format FROM hulld.store"));
-  if (!number.ok()) return number.status();
-  if (*number != kFormat) return OtherFormat("the store", *number, kFormat);
+  HULLD_ASSIGN_OR_RETURN(const uint64_t number,
+                         OnlyNumber(session.Run("SELECT format FROM hulld.store")));
+  if (number != kFormat) return OtherFormat("the store", number, kFormat);
   const absl::StatusOr<bool> is_marked = HasTable(session, "hulld.migration");
   if (!is_marked.ok()) return is_marked;
   if (options_.migrating || !*is_marked) return true;
@@ -34,16 +34,15 @@ absl::StatusOr<bool> PostgresStore::CheckFormat(Session& session) const {
 }
 
 absl::StatusOr<bool> PostgresStore::TryLock(Session& session) const {
-  const absl::StatusOr<Rows> locked = session.Run(absl::StrCat(
-      "SELECT pg_try_advisory_lock", options_.shared ? "_shared" : "", "(", kLock, ")"));
-  if (!locked.ok()) return locked.status();
-  return locked->at(0, 0) == "t";
+  const char* const lock = options_.shared ? "pg_try_advisory_lock_shared" : "pg_try_advisory_lock";
+  HULLD_ASSIGN_OR_RETURN(const Rows locked,
+                         session.Run(absl::StrCat("SELECT ", lock, "(", kLock, ")")));
+  return locked.at(0, 0) == "t";
 }
 
 absl::StatusOr<std::string> PostgresStore::Owner(Session& session) const {
-  const absl::StatusOr<Rows> owner = session.Run("SELECT owner FROM hulld.store");
-  if (!owner.ok()) return owner.status();
-  return owner->count() == 0 ? "" : std::string(owner->at(0, 0));
+  HULLD_ASSIGN_OR_RETURN(const Rows owner, session.Run("SELECT owner FROM hulld.store"));
+  return owner.count() == 0 ? "" : std::string(owner.at(0, 0));
 }
 
 absl::Status PostgresStore::Superseded(std::string_view owner) {
@@ -99,31 +98,26 @@ void PostgresStore::Keep() {
 
 absl::Status PostgresStore::Beat() {
   if (keeper_session_ == nullptr) {
-    absl::StatusOr<std::unique_ptr<Session>> session = OpenKeeper();
-    if (!session.ok()) return session.status();
-    keeper_session_ = *std::move(session);
+    HULLD_ASSIGN_OR_RETURN(keeper_session_, OpenKeeper());
   }
-  const absl::StatusOr<std::string> owner = Owner(*keeper_session_);
-  if (!owner.ok()) return owner.status();
-  if (*owner != store_owner()) {
-    End(Superseded(*owner));
+  HULLD_ASSIGN_OR_RETURN(const std::string owner, Owner(*keeper_session_));
+  if (owner != store_owner()) {
+    End(Superseded(owner));
     return absl::OkStatus();
   }
   if (has_lock_) return absl::OkStatus();
-  const absl::StatusOr<bool> locked = TryLock(*keeper_session_);
-  if (!locked.ok()) return locked.status();
-  has_lock_ = *locked;
+  HULLD_ASSIGN_OR_RETURN(has_lock_, TryLock(*keeper_session_));
   return absl::OkStatus();
 }
 
 // Measures the size of the tables, if the role permits it.
 absl::Status PostgresStore::MeasureDisk() {
-  const absl::StatusOr<Rows> size = keeper_session_->Run(
-      "SELECT sum(pg_total_relation_size(oid)) FROM pg_class "
-      "WHERE relnamespace = 'hulld'::regnamespace AND relkind = 'r'");
-  if (!size.ok()) return size.status();
+  HULLD_ASSIGN_OR_RETURN(
+      const Rows size,
+      keeper_session_->Run("SELECT sum(pg_total_relation_size(oid)) FROM pg_class "
+                           "WHERE relnamespace = 'hulld'::regnamespace AND relkind = 'r'"));
   StoreDisk disk;
-  if (size->count() != 1 || !absl::SimpleAtoi(std::string(size->at(0, 0)), &disk.bytes)) {
+  if (size.count() != 1 || !absl::SimpleAtoi(std::string(size.at(0, 0)), &disk.bytes)) {
     return absl::OkStatus();
   }
   const std::lock_guard lock(mutex_);

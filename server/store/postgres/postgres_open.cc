@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/base/status_macros.h"
 #include "server/contract/status_map.h"
 #include "server/contract/stopped_call.h"
 #include "server/process/random_id.h"
@@ -299,35 +300,31 @@ absl::Status PostgresStore::CheckServer(Session& session) {
                                                       session.server_version() / 10'000,
                                                       "; hulld requires 14 or later"));
   }
-  const absl::StatusOr<Rows> settings =
-      session.Run("SELECT current_setting('synchronous_commit'), current_setting('fsync')");
-  if (!settings.ok()) return settings.status();
-  synchronous_commit_ = std::string(settings->at(0, 0));
-  const bool is_sync = synchronous_commit_ != "off" && settings->at(0, 1) == "on";
+  HULLD_ASSIGN_OR_RETURN(
+      const Rows settings,
+      session.Run("SELECT current_setting('synchronous_commit'), current_setting('fsync')"));
+  synchronous_commit_ = std::string(settings.at(0, 0));
+  const bool is_sync = synchronous_commit_ != "off" && settings.at(0, 1) == "on";
   durability_ = is_sync ? Durability::kSync : Durability::kRelaxed;
   if (options_.shared && !is_sync) {
     return absl::FailedPreconditionError(
         "--postgres-servers many requires synchronous_commit = on and fsync = on; without them an "
         "outage could revert changes that peer servers have already applied");
   }
-  const absl::StatusOr<bool> exists = CheckFormat(session);
-  if (options_.must_exist && exists.ok() && !*exists) {
-    return absl::NotFoundError("the database contains no hulld store");
-  }
-  return exists.status();
+  HULLD_ASSIGN_OR_RETURN(const bool exists, CheckFormat(session));
+  if (exists || !options_.must_exist) return absl::OkStatus();
+  return absl::NotFoundError("the database contains no hulld store");
 }
 
 // Atomic: a server killed in the middle leaves either all of the tables or none.
 absl::Status PostgresStore::MakeSchema(Session& session) {
-  const absl::StatusOr<bool> exists = CheckFormat(session);
-  if (!exists.ok()) return exists.status();
-  if (*exists) return absl::OkStatus();
-  const absl::StatusOr<Rows> schema =
-      session.Run("SELECT 1 FROM pg_namespace WHERE nspname = 'hulld'");
-  if (!schema.ok()) return schema.status();
+  HULLD_ASSIGN_OR_RETURN(const bool exists, CheckFormat(session));
+  if (exists) return absl::OkStatus();
+  HULLD_ASSIGN_OR_RETURN(const Rows schema,
+                         session.Run("SELECT 1 FROM pg_namespace WHERE nspname = 'hulld'"));
   const absl::Status made =
       session
-          .Run(absl::StrCat("BEGIN;", schema->count() == 0 ? "CREATE SCHEMA hulld;" : "", kTables,
+          .Run(absl::StrCat("BEGIN;", schema.count() == 0 ? "CREATE SCHEMA hulld;" : "", kTables,
                             "INSERT INTO hulld.store (format, store_id, revision, batch, epoch, "
                             "owner, written_in, relaxed) VALUES (",
                             kFormat, ", '", RandomId(), "', 0, 0, 0, '', 0, false); COMMIT;"))
@@ -338,25 +335,22 @@ absl::Status PostgresStore::MakeSchema(Session& session) {
 
 // Makes this server the owner of the store.
 absl::Status PostgresStore::Begin() {
-  if (absl::Status s = RenewWriter(); !s.ok()) return s;
-  const absl::StatusOr<Rows> former = writer_->Run("SELECT store_id FROM hulld.store");
-  if (!former.ok()) return former.status();
+  HULLD_RETURN_IF_ERROR(RenewWriter());
+  HULLD_ASSIGN_OR_RETURN(const Rows former, writer_->Run("SELECT store_id FROM hulld.store"));
   const std::string is_relaxed(1, durability_ == Durability::kRelaxed);
   const absl::Status claimed =
       Claim({.name = "hulld_claim", .parameters = {owner_, RandomId(), is_relaxed}}).status();
-  if (claimed.ok() && id_ != former->at(0, 0)) {
+  if (claimed.ok() && id_ != former.at(0, 0)) {
     spdlog::warn(
         "store {} was open with synchronous_commit = off and not shut down cleanly; its last "
         "acknowledged changes may be lost; continuing at revision {} as store {}",
-        std::string(former->at(0, 0)), revision_, id_);
+        std::string(former.at(0, 0)), revision_, id_);
   }
   return claimed;
 }
 
 absl::Status PostgresStore::RenewWriter() {
-  absl::StatusOr<std::unique_ptr<Session>> session = OpenWriter();
-  if (!session.ok()) return session.status();
-  writer_ = *std::move(session);
+  HULLD_ASSIGN_OR_RETURN(writer_, OpenWriter());
   return absl::OkStatus();
 }
 

@@ -6,6 +6,7 @@
 #include <optional>
 #include <utility>
 
+#include "core/base/status_macros.h"
 #include "server/store/postgres/postgres_store.h"
 #include "server/store/sealed_hull.h"
 #include "server/store/store_errors.h"
@@ -70,7 +71,7 @@ std::optional<std::vector<Vector>> PointsOf(const Rows& deltas, const HullGrowth
 // A server that became active during the read may have changed the data. The owner is read last, so
 // if it is still this server, everything read before is valid, including missing or damaged data.
 absl::StatusOr<std::vector<Rows>> PostgresStore::Read(std::vector<Statement> statements) {
-  if (absl::Status s = ended(); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(ended());
   statements.push_back({.name = "hulld_owner"});
   absl::StatusOr<std::vector<Rows>> rows = readers_.Ask(statements);
   if (!rows.ok()) {
@@ -88,23 +89,22 @@ absl::StatusOr<std::vector<Rows>> PostgresStore::Read(std::vector<Statement> sta
 absl::StatusOr<Rows> PostgresStore::ReadOne(Statement statement) {
   std::vector<Statement> statements;
   statements.push_back(std::move(statement));
-  absl::StatusOr<std::vector<Rows>> rows = Read(std::move(statements));
-  if (!rows.ok()) return rows.status();
-  return std::move(rows->front());
+  HULLD_ASSIGN_OR_RETURN(std::vector<Rows> rows, Read(std::move(statements)));
+  return std::move(rows.front());
 }
 
 absl::Status PostgresStore::ForEachRow(
     const char* statement, const std::function<void(const std::string&, std::string_view)>& visit) {
   std::string last;
   while (true) {
-    const absl::StatusOr<Rows> rows =
-        ReadOne({.name = statement, .parameters = {last, EncodeInteger(kRowsPerPortion)}});
-    if (!rows.ok()) return rows.status();
-    for (int i = 0; i < rows->count(); ++i) {
-      last = std::string(rows->at(i, 0));
-      visit(last, rows->at(i, 1));
+    HULLD_ASSIGN_OR_RETURN(
+        const Rows rows,
+        ReadOne({.name = statement, .parameters = {last, EncodeInteger(kRowsPerPortion)}}));
+    for (int i = 0; i < rows.count(); ++i) {
+      last = std::string(rows.at(i, 0));
+      visit(last, rows.at(i, 1));
     }
-    if (static_cast<uint32_t>(rows->count()) < kRowsPerPortion) return absl::OkStatus();
+    if (static_cast<uint32_t>(rows.count()) < kRowsPerPortion) return absl::OkStatus();
   }
 }
 
@@ -123,9 +123,9 @@ absl::Status PostgresStore::ForEachBody(const StoredBodyVisitor& visit) {
 absl::StatusOr<FoundRecords> PostgresStore::FindRecords(std::span<const std::string> ids) {
   ArrayParameter asked(ArrayParameter::Element::kText);
   for (const std::string& id : ids) asked.Add(id);
-  const absl::StatusOr<Rows> rows = ReadOne({.name = "hulld_find", .parameters = {asked.Take()}});
-  if (!rows.ok()) return rows.status();
-  return FoundIn(*rows, "", SIZE_MAX);
+  HULLD_ASSIGN_OR_RETURN(const Rows rows,
+                         ReadOne({.name = "hulld_find", .parameters = {asked.Take()}}));
+  return FoundIn(rows, "", SIZE_MAX);
 }
 
 // Requests one extra row to detect whether more follow. A prefix that no ID can have may contain
@@ -134,25 +134,26 @@ absl::StatusOr<FoundRecords> PostgresStore::ListRecords(const std::string& prefi
                                                         const std::string& after, size_t most,
                                                         RecordKinds kinds) {
   const bool may_be = std::ranges::all_of(prefix, [](char c) { return c > ' ' && c <= '~'; });
-  const absl::StatusOr<Rows> rows =
+  HULLD_ASSIGN_OR_RETURN(
+      const Rows rows,
       ReadOne({.name = "hulld_list",
                .parameters = {may_be ? prefix : "\x7f", after, EncodeBigint(most + 1),
                               EncodeBoolean(kinds.hulls), EncodeBoolean(kinds.bodies),
-                              EncodeBigint(kMaxListedBytes)}});
-  if (!rows.ok()) return rows.status();
-  return FoundIn(*rows, prefix, most);
+                              EncodeBigint(kMaxListedBytes)}}));
+  return FoundIn(rows, prefix, most);
 }
 
 absl::StatusOr<std::vector<Vector>> PostgresStore::LoadVertices(const StoredHull& hull) {
   const std::string& id = hull.record.hull_id;
   const uint64_t incarnation = hull.record.create_revision;
-  const absl::StatusOr<std::vector<Rows>> rows = Read(
-      {{.name = "hulld_base",
-        .parameters = {id, EncodeBigint(incarnation), EncodeBigint(hull.layout.base_revision)}},
-       AskForDeltas(hull.record, hull.layout.base_revision, hull.record.revision)});
-  if (!rows.ok()) return rows.status();
-  const Rows& base = (*rows)[0];
-  const Rows& deltas = (*rows)[1];
+  HULLD_ASSIGN_OR_RETURN(
+      const std::vector<Rows> rows,
+      Read(
+          {{.name = "hulld_base",
+            .parameters = {id, EncodeBigint(incarnation), EncodeBigint(hull.layout.base_revision)}},
+           AskForDeltas(hull.record, hull.layout.base_revision, hull.record.revision)}));
+  const Rows& base = rows[0];
+  const Rows& deltas = rows[1];
   VertexAssembly assembly(hull);
   absl::Status status;
   for (int i = 0; status.ok() && assembly.wants_base_part(); ++i) {
@@ -193,29 +194,26 @@ std::vector<std::optional<std::vector<Vector>>> PostgresStore::LoadGrowth(
 absl::StatusOr<uint64_t> PostgresStore::LoadSequence(const HullRecord& hull,
                                                      const std::string& writer_id) {
   const uint64_t incarnation = hull.create_revision;
-  const absl::StatusOr<Rows> rows =
+  HULLD_ASSIGN_OR_RETURN(
+      const Rows rows,
       ReadOne({.name = options_.shared ? "hulld_sequence_and_record" : "hulld_sequence",
-               .parameters = {hull.hull_id, EncodeBigint(incarnation), writer_id}});
-  if (!rows.ok()) return rows.status();
-  const absl::Status current = options_.shared ? CheckRecord(hull, *rows) : absl::OkStatus();
-  if (!current.ok()) return current;
-  if (rows->count() == 0 || rows->at(0, 0).empty()) return 0;
-  return UnsealSequence(hull.hull_id, WriterKey(incarnation, writer_id), rows->at(0, 0));
+               .parameters = {hull.hull_id, EncodeBigint(incarnation), writer_id}}));
+  HULLD_RETURN_IF_ERROR(options_.shared ? CheckRecord(hull, rows) : absl::OkStatus());
+  if (rows.count() == 0 || rows.at(0, 0).empty()) return 0;
+  return UnsealSequence(hull.hull_id, WriterKey(incarnation, writer_id), rows.at(0, 0));
 }
 
 absl::StatusOr<std::vector<WriterSequence>> PostgresStore::LoadWriters(const StoredHull& hull) {
   const std::string& id = hull.record.hull_id;
   const uint64_t incarnation = hull.record.create_revision;
-  const absl::StatusOr<Rows> rows =
-      ReadOne({.name = "hulld_writers", .parameters = {id, EncodeBigint(incarnation)}});
-  if (!rows.ok()) return rows.status();
+  HULLD_ASSIGN_OR_RETURN(const Rows rows, ReadOne({.name = "hulld_writers",
+                                                   .parameters = {id, EncodeBigint(incarnation)}}));
   std::vector<WriterSequence> writers;
-  for (int i = 0; i < rows->count(); ++i) {
-    const std::string writer_id(rows->at(i, 0));
-    const absl::StatusOr<uint64_t> sequence =
-        UnsealSequence(id, WriterKey(incarnation, writer_id), rows->at(i, 1));
-    if (!sequence.ok()) return sequence.status();
-    writers.push_back({writer_id, *sequence});
+  for (int i = 0; i < rows.count(); ++i) {
+    const std::string writer_id(rows.at(i, 0));
+    HULLD_ASSIGN_OR_RETURN(const uint64_t sequence,
+                           UnsealSequence(id, WriterKey(incarnation, writer_id), rows.at(i, 1)));
+    writers.push_back({writer_id, sequence});
   }
   return writers;
 }

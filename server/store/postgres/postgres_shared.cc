@@ -7,6 +7,7 @@
 #include <map>
 #include <utility>
 
+#include "core/base/status_macros.h"
 #include "server/process/random_id.h"
 #include "server/store/postgres/batch_statements.h"
 #include "server/store/postgres/postgres_store.h"
@@ -172,9 +173,8 @@ std::string PostgresStore::PrepareShared() { return absl::StrCat(kPrepareFetch, 
 
 // Serializes the creation of tables by servers that start together.
 absl::Status PostgresStore::MakeSharedSchema(Session& session) {
-  const absl::Status locked =
-      session.Run(absl::StrCat("SELECT pg_advisory_lock(", kSchemaLock, ")")).status();
-  if (!locked.ok()) return locked;
+  HULLD_RETURN_IF_ERROR(
+      session.Run(absl::StrCat("SELECT pg_advisory_lock(", kSchemaLock, ")")).status());
   absl::Status made = MakeSchema(session);
   if (made.ok()) made = MakeSharedTables(session);
   session.Run(absl::StrCat("SELECT pg_advisory_unlock(", kSchemaLock, ")")).status().IgnoreError();
@@ -184,11 +184,10 @@ absl::Status PostgresStore::MakeSharedSchema(Session& session) {
 // Makes this server one of the store's owners, and fences off a server that was previously the only
 // active one.
 absl::Status PostgresStore::Join() {
-  if (absl::Status s = RenewWriter(); !s.ok()) return s;
-  const absl::StatusOr<Rows> joined =
-      Claim({.name = "hulld_join", .parameters = {kSeveralServers}});
-  if (!joined.ok()) return joined.status();
-  if (joined->at(0, 7) != std::string(1, '\0')) {
+  HULLD_RETURN_IF_ERROR(RenewWriter());
+  HULLD_ASSIGN_OR_RETURN(const Rows joined,
+                         Claim({.name = "hulld_join", .parameters = {kSeveralServers}}));
+  if (joined.at(0, 7) != std::string(1, '\0')) {
     return absl::FailedPreconditionError(
         "the store was open with synchronous_commit = off and not shut down cleanly; start and "
         "stop one hulld with --postgres-servers one first, which gives the store a new ID");
@@ -233,7 +232,7 @@ absl::Status PostgresStore::CheckStore(const Rows& rows) {
 
 // rows: of hulld_follow.
 absl::Status PostgresStore::NotePeerChanges(const Rows& rows) {
-  if (absl::Status s = CheckStore(rows); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(CheckStore(rows));
   for (int i = 0; i < rows.count(); ++i) {
     const std::string id(rows.at(i, 5));
     if (id.empty()) continue;
@@ -342,15 +341,14 @@ void PostgresStore::GiveNewId() {
 // that held it has ended, and nothing of it can arrive later because its COMMIT was sent before.
 // The sync of this transaction covers earlier commits.
 absl::StatusOr<bool> PostgresStore::SharedOutcome(uint64_t batch) {
-  if (absl::Status s = RenewWriter(); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(RenewWriter());
   std::vector<Statement> statements;
   statements.push_back({.text = "BEGIN"});
   statements.push_back({.name = "hulld_touch", .parameters = {EncodeBigint(epoch())}});
   statements.push_back({.name = "hulld_server", .parameters = {owner_}});
   statements.push_back({.text = "COMMIT"});
-  const absl::StatusOr<std::vector<Rows>> rows = writer_->AskToCommit(statements);
-  if (!rows.ok()) return rows.status();
-  const Rows& last = (*rows)[2];
+  HULLD_ASSIGN_OR_RETURN(const std::vector<Rows> rows, writer_->AskToCommit(statements));
+  const Rows& last = rows[2];
   return last.count() == 1 && last.bigint(0, 0) == batch;
 }
 
@@ -386,10 +384,9 @@ bool PostgresStore::HearsPeers() const {
 
 // Polls for new commits of peer servers, and reports them.
 absl::Status PostgresStore::PollPeers() {
-  const absl::StatusOr<uint64_t> batch = LastBatch(*keeper_session_);
-  if (!batch.ok()) return batch.status();
-  looked_at_ = *batch;
-  if (*batch != seen_batch_) NotifyPeerCommit();
+  HULLD_ASSIGN_OR_RETURN(const uint64_t batch, LastBatch(*keeper_session_));
+  looked_at_ = batch;
+  if (batch != seen_batch_) NotifyPeerCommit();
   return absl::OkStatus();
 }
 
@@ -407,20 +404,18 @@ void PostgresStore::OnPeerCommit(std::function<void()> committed) {
 // Compares the hull's record with `hull`, as of a sequence. rows: of hulld_sequence_and_record.
 absl::Status PostgresStore::CheckRecord(const HullRecord& hull, const Rows& rows) {
   if (rows.count() == 0) return Moved();
-  const absl::StatusOr<StoredHull> now = UnsealStoredHull(hull.hull_id, rows.at(0, 1));
-  if (!now.ok()) return now.status();
-  return now->record == hull ? absl::OkStatus() : Moved();
+  HULLD_ASSIGN_OR_RETURN(const StoredHull now, UnsealStoredHull(hull.hull_id, rows.at(0, 1)));
+  return now.record == hull ? absl::OkStatus() : Moved();
 }
 
 // Explains vertices that contradict the record. ABORTED: a peer server changed the hull since.
 absl::Status PostgresStore::WhyDamaged(const StoredHull& hull, const absl::Status& damage) {
-  const absl::StatusOr<Rows> rows =
-      ReadOne({.name = "hulld_record", .parameters = {hull.record.hull_id}});
-  if (!rows.ok()) return rows.status();
-  if (rows->count() == 0) return Moved();
-  const absl::StatusOr<StoredHull> now = UnsealStoredHull(hull.record.hull_id, rows->at(0, 0));
-  if (!now.ok()) return now.status();
-  return now->record.revision == hull.record.revision ? damage : Moved();
+  HULLD_ASSIGN_OR_RETURN(const Rows rows,
+                         ReadOne({.name = "hulld_record", .parameters = {hull.record.hull_id}}));
+  if (rows.count() == 0) return Moved();
+  HULLD_ASSIGN_OR_RETURN(const StoredHull now,
+                         UnsealStoredHull(hull.record.hull_id, rows.at(0, 0)));
+  return now.record.revision == hull.record.revision ? damage : Moved();
 }
 
 }  // namespace hulld::server

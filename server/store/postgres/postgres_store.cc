@@ -10,6 +10,7 @@
 #include <iterator>
 #include <utility>
 
+#include "core/base/status_macros.h"
 #include "server/process/random_id.h"
 #include "server/store/postgres/batch_statements.h"
 
@@ -141,11 +142,11 @@ void PostgresStore::Keep(const Batch& batch) {
 // Raises the epoch in a new session. This waits for the batch's transaction to end if it has locked
 // the row, and fences it off otherwise. The sync covers earlier commits.
 absl::StatusOr<bool> PostgresStore::Reclaim(uint64_t batch) {
-  if (absl::Status s = RenewWriter(); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(RenewWriter());
   const Statement reclaim = {.name = "hulld_reclaim", .parameters = {owner_}};
-  const absl::StatusOr<std::vector<Rows>> rows = writer_->AskToCommit(std::span(&reclaim, 1));
-  if (!rows.ok()) return rows.status();
-  const Rows& claimed = rows->front();
+  HULLD_ASSIGN_OR_RETURN(const std::vector<Rows> rows,
+                         writer_->AskToCommit(std::span(&reclaim, 1)));
+  const Rows& claimed = rows.front();
   if (claimed.count() == 0) return OutcomeBeforePeers(batch);
   epoch_ = claimed.bigint(0, 0);
   const uint64_t found = claimed.bigint(0, 1);
@@ -153,9 +154,8 @@ absl::StatusOr<bool> PostgresStore::Reclaim(uint64_t batch) {
   // The database lost acknowledged commits through an outage without sync or a restore of an
   // earlier state. It will assign their revisions to other changes, so this is now a different
   // store.
-  const absl::StatusOr<Rows> renamed =
-      writer_->Ask({.name = "hulld_rename", .parameters = {RandomId()}});
-  if (!renamed.ok()) return renamed.status();
+  HULLD_RETURN_IF_ERROR(
+      writer_->Ask({.name = "hulld_rename", .parameters = {RandomId()}}).status());
   End(absl::UnavailableError(
       absl::StrCat("the database has lost ", batch_ - found,
                    " batches committed by this server (failover to a lagging standby, a restored "
@@ -166,21 +166,20 @@ absl::StatusOr<bool> PostgresStore::Reclaim(uint64_t batch) {
 
 // The first epoch after this server's records the number of batches at its start.
 absl::StatusOr<bool> PostgresStore::OutcomeBeforePeers(uint64_t batch) {
-  const absl::StatusOr<Rows> next =
-      writer_->Ask({.name = "hulld_next_epoch", .parameters = {EncodeBigint(epoch())}});
-  if (!next.ok()) return next.status();
-  if (next->count() == 0) {
+  HULLD_ASSIGN_OR_RETURN(const Rows next, writer_->Ask({.name = "hulld_next_epoch",
+                                                        .parameters = {EncodeBigint(epoch())}}));
+  if (next.count() == 0) {
     End(
         absl::UnavailableError("the database was restored to a state before this server became "
                                "active; this server exits"));
     return false;
   }
   End(Superseded(""));
-  return next->bigint(0, 0) >= batch;
+  return next.bigint(0, 0) >= batch;
 }
 
 absl::Status PostgresStore::Commit(std::span<Change* const> changes) {
-  if (absl::Status s = ended(); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(ended());
   if (!unknown_.ok()) return unknown_;
   const Clock::time_point deadline = Clock::now() + options_.patience;
   for (auto pause = kFirstRetryPause;; pause = std::min(2 * pause, kLongestRetryPause)) {
@@ -223,7 +222,7 @@ absl::Status PostgresStore::Commit(std::span<Change* const> changes) {
 // Determines unknown outcomes. A refused batch that was committed after all cannot be undone, so
 // the server that refused it ends, and the next one serves it.
 absl::Status PostgresStore::Recover() {
-  if (absl::Status s = ended(); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(ended());
   if (unknown_.ok()) return absl::OkStatus();
   const absl::StatusOr<bool> committed = Reclaim(batch_ + 1);
   if (!committed.ok()) {
@@ -237,7 +236,7 @@ absl::Status PostgresStore::Recover() {
         "the database committed changes whose outcome was reported as unknown; this server's "
         "memory is stale, so it exits; restart it to serve them"));
   }
-  if (absl::Status s = ended(); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(ended());
   spdlog::warn("the database accepts writes again");
   return absl::OkStatus();
 }

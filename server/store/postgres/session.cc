@@ -11,6 +11,7 @@
 #include <cstring>
 #include <utility>
 
+#include "core/base/status_macros.h"
 #include "server/contract/error_info.h"
 
 namespace hulld::server {
@@ -118,7 +119,7 @@ absl::Status Session::AwaitResult() {
 }
 
 absl::StatusOr<PGresult*> Session::NextResult() {
-  if (absl::Status s = AwaitResult(); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(AwaitResult());
   return PQgetResult(connection_.get());
 }
 
@@ -149,11 +150,10 @@ absl::StatusOr<Rows> Session::Run(const std::string& text) {
   Rows rows(nullptr);
   absl::Status failure;
   while (true) {
-    const absl::StatusOr<PGresult*> result = NextResult();
-    if (!result.ok()) return result.status();
-    if (*result == nullptr) break;
-    rows = Rows(*result);
-    if (failure.ok() && IsError(*result)) failure = ErrorOf(*result);
+    HULLD_ASSIGN_OR_RETURN(PGresult* const result, NextResult());
+    if (result == nullptr) break;
+    rows = Rows(result);
+    if (failure.ok() && IsError(result)) failure = ErrorOf(result);
   }
   if (!failure.ok()) return failure;
   return rows;
@@ -179,7 +179,7 @@ absl::Status Session::Send(const Statement& statement) {
 }
 
 absl::StatusOr<std::vector<Rows>> Session::Ask(std::span<const Statement> statements) {
-  if (absl::Status s = Start(statements); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(Start(statements));
   return Finish();
 }
 
@@ -188,7 +188,7 @@ absl::Status Session::Start(std::span<const Statement> statements) {
   PGconn* const connection = connection_.get();
   if (PQenterPipelineMode(connection) == 0) return Lost("a statement is in progress");
   for (const Statement& statement : statements) {
-    if (absl::Status s = Send(statement); !s.ok()) return s;
+    HULLD_RETURN_IF_ERROR(Send(statement));
   }
   // Sends as much as the connection accepts without blocking.
   if (PQpipelineSync(connection) == 0) return Lost(OneLine(PQerrorMessage(connection)));
@@ -202,16 +202,15 @@ absl::StatusOr<std::vector<Rows>> Session::Finish() {
   absl::Status failure;
   bool synced = false;
   while (!synced) {
-    const absl::StatusOr<PGresult*> result = NextResult();
-    if (!result.ok()) return result.status();
-    if (*result == nullptr) {
+    HULLD_ASSIGN_OR_RETURN(PGresult* const result, NextResult());
+    if (result == nullptr) {
       // The end of a statement's results.
       if (PQstatus(connection) == CONNECTION_OK) continue;
       return Lost(OneLine(PQerrorMessage(connection)));
     }
-    Rows one(*result);
-    synced = PQresultStatus(*result) == PGRES_PIPELINE_SYNC;
-    if (failure.ok() && IsError(*result)) failure = ErrorOf(*result);
+    Rows one(result);
+    synced = PQresultStatus(result) == PGRES_PIPELINE_SYNC;
+    if (failure.ok() && IsError(result)) failure = ErrorOf(result);
     if (!lost_.ok()) return lost_;
     if (!synced) rows.push_back(std::move(one));
   }
@@ -243,9 +242,8 @@ std::vector<std::string> Session::TakeNotices() {
 }
 
 absl::StatusOr<Rows> Session::Ask(Statement statement) {
-  absl::StatusOr<std::vector<Rows>> rows = Ask(std::span<const Statement>(&statement, 1));
-  if (!rows.ok()) return rows.status();
-  return std::move(rows->front());
+  HULLD_ASSIGN_OR_RETURN(std::vector<Rows> rows, Ask(std::span<const Statement>(&statement, 1)));
+  return std::move(rows.front());
 }
 
 absl::StatusOr<std::vector<Rows>> Session::AskToCommit(std::span<const Statement> statements) {
@@ -263,10 +261,9 @@ absl::StatusOr<uint64_t> OnlyNumber(const absl::StatusOr<Rows>& rows) {
 }
 
 absl::StatusOr<bool> HasTable(Session& session, const std::string& name) {
-  const absl::StatusOr<Rows> found =
-      session.Run(absl::StrCat("SELECT to_regclass('", name, "') IS NOT NULL"));
-  if (!found.ok()) return found.status();
-  return found->at(0, 0) == "t";
+  HULLD_ASSIGN_OR_RETURN(const Rows found,
+                         session.Run(absl::StrCat("SELECT to_regclass('", name, "') IS NOT NULL")));
+  return found.at(0, 0) == "t";
 }
 
 }  // namespace hulld::server

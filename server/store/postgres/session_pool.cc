@@ -4,14 +4,15 @@
 
 #include <utility>
 
+#include "core/base/status_macros.h"
+
 namespace hulld::server {
 
 absl::StatusOr<std::vector<Rows>> SessionPool::Ask(std::span<const Statement> statements) {
-  absl::StatusOr<std::unique_ptr<Session>> session = Take(false);
-  if (!session.ok()) return session.status();
+  HULLD_ASSIGN_OR_RETURN(std::unique_ptr<Session> session, Take(false));
   // Finish reports a lost session.
-  (*session)->Start(statements).IgnoreError();
-  return Finish(*std::move(session), statements);
+  session->Start(statements).IgnoreError();
+  return Finish(std::move(session), statements);
 }
 
 std::unique_ptr<Session> SessionPool::TryStart(std::span<const Statement> statements) {
@@ -34,9 +35,7 @@ absl::StatusOr<std::vector<Rows>> SessionPool::Finish(std::unique_ptr<Session> s
     const bool is_lost = IsLost(rows.status());
     GiveBack(is_lost ? nullptr : std::move(session));
     if (!is_lost || !again) break;
-    absl::StatusOr<std::unique_ptr<Session>> fresh = Take(true);
-    if (!fresh.ok()) return fresh.status();
-    session = *std::move(fresh);
+    HULLD_ASSIGN_OR_RETURN(session, Take(true));
     rows = session->Ask(statements);
   }
   return rows;
