@@ -1,11 +1,13 @@
 #include "server/call/message_bytes.h"
 
 #include <absl/strings/str_cat.h>
-#include <google/protobuf/io/coded_stream.h>
 #include <grpcpp/impl/codegen/proto_utils.h>
-#include <grpcpp/support/proto_buffer_reader.h>
+#include <grpcpp/support/slice.h>
+
+#include <string_view>
 
 #include "core/base/check.h"
+#include "core/base/status_macros.h"
 #include "server/call/message_layout.h"
 
 namespace hulld::server {
@@ -21,19 +23,16 @@ absl::Status Malformed(const google::protobuf::Message& message) {
 
 absl::Status ParseRequest(Bytes& bytes, RequestMemory& memory, google::protobuf::Message* message,
                           RequestMemory::Share& share) {
-  {
-    grpc::ProtoBufferReader reader(&bytes);
-    google::protobuf::io::CodedInputStream input(&reader);
-    const MessageLayout& layout = MessageLayout::Of(*message->GetDescriptor());
-    const uint64_t parsed = layout.ParsedBytes(input, memory.limit_bytes());
-    if (absl::Status s = memory.Take(parsed, share); !s.ok()) return s;
-  }
-  bool is_message = false;
-  {
-    grpc::ProtoBufferReader reader(&bytes);
-    is_message = reader.status().ok() && message->ParseFromZeroCopyStream(&reader);
+  grpc::Slice slice;
+  // Copies only a message in several slices.
+  if (!bytes.TrySingleSlice(&slice).ok() && !bytes.DumpToSingleSlice(&slice).ok()) {
+    return Malformed(*message);
   }
   bytes.Clear();
+  const std::string_view text(reinterpret_cast<const char*>(slice.begin()), slice.size());
+  const MessageLayout& layout = MessageLayout::Of(*message->GetDescriptor());
+  HULLD_RETURN_IF_ERROR(memory.Take(layout.ParsedBytes(text, memory.limit_bytes()), share));
+  const bool is_message = message->ParseFromArray(text.data(), static_cast<int>(text.size()));
   return is_message ? absl::OkStatus() : Malformed(*message);
 }
 

@@ -15,7 +15,6 @@ namespace {
 
 using google::protobuf::Descriptor;
 using google::protobuf::FieldDescriptor;
-using google::protobuf::io::CodedInputStream;
 using WireFormat = google::protobuf::internal::WireFormatLite;
 
 // Maximum overhead of an allocation.
@@ -62,51 +61,12 @@ uint32_t ElementBytes(FieldDescriptor::CppType type) {
   }
 }
 
-uint64_t VarintsEndingIn(const uint8_t* bytes, const uint8_t* end) {
-  return static_cast<uint64_t>(std::count_if(bytes, end, [](uint8_t byte) { return byte < 0x80; }));
-}
-
 }  // namespace
 
-// A message in several blocks of memory.
-class MessageLayout::PiecedInput {
+// The unread part of a message.
+class MessageLayout::Input {
  public:
-  explicit PiecedInput(CodedInputStream& input) : input_(input) {}
-
-  // 0: at the end, or malformed.
-  uint32_t ReadTag() { return input_.ReadTag(); }
-  bool ReadVarint(uint64_t* value) { return input_.ReadVarint64(value); }
-  bool Skip(uint32_t length) { return input_.Skip(static_cast<int>(length)); }
-
-  // Skips `length` bytes and counts those that end a varint. Returns false if fewer bytes are left.
-  bool CountVarints(uint32_t length, uint64_t& count) {
-    while (length > 0) {
-      const void* data = nullptr;
-      int size = 0;
-      if (!input_.GetDirectBufferPointer(&data, &size)) return false;
-      const uint32_t taken = std::min(length, static_cast<uint32_t>(size));
-      const auto* const bytes = static_cast<const uint8_t*>(data);
-      count += VarintsEndingIn(bytes, bytes + taken);
-      if (!input_.Skip(static_cast<int>(taken))) return false;
-      length -= taken;
-    }
-    return true;
-  }
-
-  // Counts a message that consists of the next `length` bytes. Returns false if it is malformed.
-  bool CountMessage(const MessageLayout& layout, uint32_t length, uint64_t most, int depth,
-                    uint64_t& bytes);
-
- private:
-  CodedInputStream& input_;
-};
-
-// A message in a single block of memory, as are most small messages.
-class MessageLayout::FlatInput {
- public:
-  FlatInput(const uint8_t* begin, const uint8_t* end) : next_(begin), end_(end) {}
-
-  bool is_at_end() const { return next_ == end_; }
+  Input(const uint8_t* begin, const uint8_t* end) : next_(begin), end_(end) {}
 
   uint32_t ReadTag() {
     uint64_t tag = 0;
@@ -126,47 +86,26 @@ class MessageLayout::FlatInput {
     return false;
   }
   bool Skip(uint32_t length) {
-    if (length > static_cast<uint64_t>(end_ - next_)) return false;
+    if (length > left()) return false;
     next_ += length;
     return true;
   }
-  bool CountVarints(uint32_t length, uint64_t& count) {
+  uint64_t left() const { return static_cast<uint64_t>(end_ - next_); }
+  // Removes and returns the next `length` bytes. Requires length <= left().
+  Input Take(uint64_t length) {
     const uint8_t* const begin = next_;
-    const bool is_whole = Skip(length);
-    count += VarintsEndingIn(begin, is_whole ? next_ : end_);
-    return is_whole;
+    next_ += length;
+    return {begin, next_};
   }
-  bool CountMessage(const MessageLayout& layout, uint32_t length, uint64_t most, int depth,
-                    uint64_t& bytes) {
-    const uint8_t* const begin = next_;
-    const bool is_whole = Skip(length);
-    FlatInput message(begin, is_whole ? next_ : end_);
-    layout.Count(message, most, depth, bytes);
-    return is_whole && message.is_at_end();
+  uint64_t CountVarints() const {
+    const auto ends_varint = [](uint8_t byte) { return byte < 0x80; };
+    return static_cast<uint64_t>(std::count_if(next_, end_, ends_varint));
   }
 
  private:
   const uint8_t* next_;
   const uint8_t* const end_;
 };
-
-bool MessageLayout::PiecedInput::CountMessage(const MessageLayout& layout, uint32_t length,
-                                              uint64_t most, int depth, uint64_t& bytes) {
-  const void* data = nullptr;
-  int size = 0;
-  if (length > 0 && input_.GetDirectBufferPointer(&data, &size) &&
-      length <= static_cast<uint32_t>(size)) {
-    const auto* const begin = static_cast<const uint8_t*>(data);
-    FlatInput message(begin, begin + length);
-    layout.Count(message, most, depth, bytes);
-    return message.is_at_end() && Skip(length);
-  }
-  const CodedInputStream::Limit limit = input_.PushLimit(static_cast<int>(length));
-  layout.Count(*this, most, depth, bytes);
-  if (input_.BytesUntilLimit() != 0) return false;
-  input_.PopLimit(limit);
-  return true;
-}
 
 const MessageLayout& MessageLayout::Of(const Descriptor& type) {
   // Recursive: a layout requests the layouts of its fields. Self-referential types are not
@@ -220,14 +159,14 @@ const MessageLayout::Field& MessageLayout::FieldAt(int number) const {
                                                       : kNone;
 }
 
-uint64_t MessageLayout::ParsedBytes(CodedInputStream& input, uint64_t most) const {
+uint64_t MessageLayout::ParsedBytes(std::string_view message, uint64_t most) const {
   uint64_t bytes = own_bytes_;
-  PiecedInput pieced(input);
-  Count(pieced, most, 0, bytes);
+  const auto* const begin = reinterpret_cast<const uint8_t*>(message.data());
+  Input input(begin, begin + message.size());
+  Count(input, most, 0, bytes);
   return bytes;
 }
 
-template <typename Input>
 void MessageLayout::Count(Input& input, uint64_t most, int depth, uint64_t& bytes) const {
   // Fields within a group count as unknown; the contract has no groups.
   int groups = 0;
@@ -274,7 +213,6 @@ void MessageLayout::Count(Input& input, uint64_t most, int depth, uint64_t& byte
 }
 
 // Counts a length-delimited field. Returns false if it is malformed or nested too deeply.
-template <typename Input>
 bool MessageLayout::CountDelimited(Input& input, const Field& field, uint64_t most, int depth,
                                    uint64_t& bytes) {
   const bool is_number = field.kind == Field::Kind::kNumber;
@@ -286,23 +224,23 @@ bool MessageLayout::CountDelimited(Input& input, const Field& field, uint64_t mo
   if (!input.ReadVarint(&read)) return false;
   const auto length = static_cast<uint32_t>(read);
   if (length > INT32_MAX) return false;
+  const bool is_whole = length <= input.left();
+  Input value = input.Take(std::min<uint64_t>(length, input.left()));
   if (is_message) {
-    return depth < kDeepest && input.CountMessage(*field.message, length, most, depth + 1, bytes);
+    if (depth >= kDeepest) return false;
+    field.message->Count(value, most, depth + 1, bytes);
+    return is_whole && value.left() == 0;
   }
   if (is_number && field.is_repeated && field.is_varint) {
-    uint64_t count = 0;
-    const bool is_whole = input.CountVarints(length, count);
-    bytes += kSlack * count * field.element_bytes;
-    return is_whole;
-  }
-  if (is_number && field.is_repeated) {
+    bytes += kSlack * value.CountVarints() * field.element_bytes;
+  } else if (is_number && field.is_repeated) {
     bytes += kSlack * length;
   } else if (field.kind == Field::Kind::kText) {
     bytes += kText + length;
   } else {
     bytes += kUnknown + length;
   }
-  return input.Skip(length);
+  return is_whole;
 }
 
 }  // namespace hulld::server

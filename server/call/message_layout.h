@@ -2,10 +2,10 @@
 #define HULLD_SERVER_CALL_MESSAGE_LAYOUT_H_
 
 #include <google/protobuf/descriptor.h>
-#include <google/protobuf/io/coded_stream.h>
 
 #include <cstddef>
 #include <cstdint>
+#include <string_view>
 #include <vector>
 
 namespace hulld::server {
@@ -18,11 +18,10 @@ class MessageLayout {
   // Returns the layout of a compiled-in type, cached after the first call. Thread-safe.
   static const MessageLayout& Of(const google::protobuf::Descriptor& type);
 
-  // Returns an upper bound on the memory, in bytes, of the message in `input` after parsing. Stops
-  // counting above `most`. Includes unknown fields, which parsing keeps. Counts a malformed message
-  // up to the point where parsing fails. Cost: O(fields), a few ns each; packed numbers at memory
-  // speed.
-  uint64_t ParsedBytes(google::protobuf::io::CodedInputStream& input, uint64_t most) const;
+  // Returns an upper bound on the memory, in bytes, of a message after parsing. Stops counting
+  // above `most`. Includes unknown fields, which parsing keeps. Counts a malformed message up to
+  // the point where parsing fails. Cost: O(fields), a few ns each; packed numbers at memory speed.
+  uint64_t ParsedBytes(std::string_view message, uint64_t most) const;
 
  private:
   struct Field {
@@ -37,12 +36,9 @@ class MessageLayout {
 
   explicit MessageLayout(const google::protobuf::Descriptor& type);
 
-  class PiecedInput;
-  class FlatInput;
+  class Input;
 
-  template <typename Input>
   void Count(Input& input, uint64_t most, int depth, uint64_t& bytes) const;
-  template <typename Input>
   static bool CountDelimited(Input& input, const Field& field, uint64_t most, int depth,
                              uint64_t& bytes);
   const Field& FieldAt(int number) const;
