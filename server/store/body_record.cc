@@ -13,24 +13,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "values are copied as they are");
 
-// Encoding of a body: binary numbers and length-prefixed strings.
-class Writer {
- public:
-  template <typename Number>
-  void Add(Number number) {
-    bytes_.append(reinterpret_cast<const char*>(&number), sizeof(number));
-  }
-  void AddText(const std::string& text) {
-    Add<uint64_t>(text.size());
-    bytes_ += text;
-  }
-  std::string Take() { return std::move(bytes_); }
-
- private:
-  std::string bytes_;
-};
-
-// Missing values read as zero or empty, and make ok() false.
+// Reads an encoded body. Missing values read as zero or empty, and make ok() false.
 class Reader {
  public:
   explicit Reader(std::string_view bytes) : rest_(bytes) {}
@@ -77,22 +60,28 @@ size_t StoredBody::MemoryBytes() const {
 }
 
 std::string EncodeStoredBody(const StoredBody& body) {
-  Writer writer;
-  writer.Add(body.record.create_revision);
-  writer.Add(body.record.revision);
-  writer.Add<uint64_t>(body.hull_ids.size());
-  for (const std::string& id : body.hull_ids) writer.AddText(id);
-  writer.Add<uint64_t>(body.pieces.size());
+  std::string bytes;
+  const auto add = [&bytes](auto number) {
+    bytes.append(reinterpret_cast<const char*>(&number), sizeof number);
+  };
+  add(body.record.create_revision);
+  add(body.record.revision);
+  add(uint64_t{body.hull_ids.size()});
+  for (const std::string& id : body.hull_ids) {
+    add(uint64_t{id.size()});
+    bytes += id;
+  }
+  add(uint64_t{body.pieces.size()});
   for (const StoredPiece& piece : body.pieces) {
-    writer.Add(piece.hull);
-    for (const double component : piece.X_BP.q) writer.Add(component);
-    for (int i = 0; i < 3; ++i) writer.Add<double>(piece.X_BP.t[i]);
+    add(piece.hull);
+    for (const double component : piece.X_BP.q) add(component);
+    for (const double component : piece.X_BP.t) add(component);
   }
   const auto is_rounded = [](const StoredPiece& piece) { return piece.radius > 0; };
   if (std::ranges::any_of(body.pieces, is_rounded)) {
-    for (const StoredPiece& piece : body.pieces) writer.Add(piece.radius);
+    for (const StoredPiece& piece : body.pieces) add(piece.radius);
   }
-  return writer.Take();
+  return bytes;
 }
 
 absl::StatusOr<StoredBody> DecodeStoredBody(std::string_view body_id, std::string_view value) {

@@ -40,7 +40,8 @@ struct StoredBody {
   size_t MemoryBytes() const;
 };
 
-// Encodes all fields but the ID, which is the key. Radii follow at the end unless all are 0.
+// Encodes all fields but the ID, which is the key, as binary numbers and texts with their lengths.
+// Radii follow at the end unless all are 0.
 std::string EncodeStoredBody(const StoredBody& body);
 // DATA_LOSS: the bytes do not encode a body.
 absl::StatusOr<StoredBody> DecodeStoredBody(std::string_view body_id, std::string_view value);

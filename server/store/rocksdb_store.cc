@@ -36,8 +36,10 @@ absl::Status RocksDbStore::WriteFailed(const rocksdb::Status& status) {
 }
 
 absl::Status RocksDbStore::ReadFailed(const rocksdb::Status& status) {
-  if (!status.IsCorruption()) ++read_failures_;
-  return ReadError(status, "cannot read");
+  const std::string text = absl::StrCat("cannot read: ", status.ToString());
+  if (status.IsCorruption()) return absl::DataLossError(text);
+  ++read_failures_;
+  return absl::UnavailableError(text);
 }
 
 // Deletes values of incarnations that have no hull, if kLostKey is set: deleting a hull with a

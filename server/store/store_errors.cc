@@ -48,12 +48,6 @@ absl::Status OutcomeUnknown(const rocksdb::Status& status, const rocksdb::Status
                    "disk is fixed; check whether it is there before you retry"));
 }
 
-absl::Status ReadError(const rocksdb::Status& status, const std::string& what) {
-  const std::string text = absl::StrCat(what, ": ", status.ToString());
-  if (status.IsCorruption()) return absl::DataLossError(text);
-  return absl::UnavailableError(text);
-}
-
 absl::Status CannotBeRead(const std::string& data_dir) {
   return absl::UnavailableError(absl::StrCat(
       "the store in --data-dir ", data_dir,

@@ -17,9 +17,6 @@ absl::Status WriteError(const rocksdb::Status& status, const std::string& data_d
 // UNAVAILABLE: a write failed, and cutting its remains off the log failed, too (`cut`).
 absl::Status OutcomeUnknown(const rocksdb::Status& status, const rocksdb::Status& cut,
                             const std::string& data_dir);
-// Error of a failed read. DATA_LOSS: the value is damaged. UNAVAILABLE: any other cause. what: the
-// failed operation.
-absl::Status ReadError(const rocksdb::Status& status, const std::string& what);
 // UNAVAILABLE: the database could not be reopened after an error, not even for reading.
 absl::Status CannotBeRead(const std::string& data_dir);
 // For a database that could not be opened. FAILED_PRECONDITION: another process has it open.
