@@ -93,6 +93,7 @@ class MessageLayout::Input {
   uint64_t left() const { return static_cast<uint64_t>(end_ - next_); }
   // Removes and returns the next `length` bytes. Requires length <= left().
   Input Take(uint64_t length) {
+    HULLD_DCHECK(length <= left());
     const uint8_t* const begin = next_;
     next_ += length;
     return {begin, next_};

@@ -88,9 +88,9 @@ absl::Status LogLost(const std::string& data_dir, const std::string& finding,
 }
 
 absl::Status OtherFormat(const std::string& where, uint64_t found, uint64_t expected) {
-  return absl::FailedPreconditionError(
-      absl::StrCat(where, " is in format ", found, "; this hulld reads only format ", expected,
-                   "; run the hulld version that wrote it"));
+  return absl::FailedPreconditionError(absl::StrCat(where, " is in format ", found,
+                                                    "; this hulld reads only format ", expected,
+                                                    "; run the hulld version that wrote it"));
 }
 
 absl::Status UnfinishedMigration() {
