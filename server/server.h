@@ -93,10 +93,10 @@ class Server {
   std::unique_ptr<Store> store_;
   // Pools for chunks and replacements, and for work that may wait for the store. Three kinds, so
   // that readers never wait for writers, and reads of microseconds never wait for reads of seconds.
-  WorkerPool writers_;
+  TaskPool writers_;
   Registry registry_;
-  WorkerPool readers_;
-  WorkerPool long_readers_;
+  TaskPool readers_;
+  TaskPool long_readers_;
   // Compute answers.
   TaskPool pool_;
   HullService hull_service_;

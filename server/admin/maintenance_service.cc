@@ -40,7 +40,7 @@ class BackupStream : public RequestStream<PulledStream<WriteReactor, v1::SaveBac
                                           v1::SaveBackupRequest> {
  public:
   BackupStream(CallContext& context, Admission& admission, Store& store, const Registry& registry,
-               WorkerPool& readers, const Bytes& request)
+               TaskPool& readers, const Bytes& request)
       : RequestStream(request, context, admission, Rpc::kSaveBackup),
         store_(store),
         registry_(registry),
@@ -136,7 +136,7 @@ class BackupStream : public RequestStream<PulledStream<WriteReactor, v1::SaveBac
 
   Store& store_;
   const Registry& registry_;
-  WorkerPool& readers_;
+  TaskPool& readers_;
   std::string directory_;
   // Paths relative to directory_. The last one is sent first.
   std::vector<std::string> files_;

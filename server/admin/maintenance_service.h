@@ -18,7 +18,7 @@ class MaintenanceService : public v1::MaintenanceService::WithRawCallbackMethod_
  public:
   // Backups are read on `readers`. All must outlive this.
   MaintenanceService(Store& store, const Registry& registry, Admission& admission,
-                     WorkerPool& readers)
+                     TaskPool& readers)
       : store_(store), registry_(registry), admission_(admission), readers_(readers) {}
 
   WriteReactor* SaveBackup(CallContext* context, const Bytes* request) override;
@@ -27,7 +27,7 @@ class MaintenanceService : public v1::MaintenanceService::WithRawCallbackMethod_
   Store& store_;
   const Registry& registry_;
   Admission& admission_;
-  WorkerPool& readers_;
+  TaskPool& readers_;
 };
 
 }  // namespace hulld::server

@@ -25,7 +25,7 @@ using BodyServiceOfBytes =
 // records are answered on arrival. Calls that involve pieces, possibly many, run on `readers`.
 class BodyService : public BodyServiceOfBytes {
  public:
-  BodyService(Registry& registry, Admission& admission, WorkerPool& readers)
+  BodyService(Registry& registry, Admission& admission, TaskPool& readers)
       : registry_(registry), admission_(admission), readers_(readers) {}
 
   UnaryReactor* PutBody(CallContext* context, const Bytes* request, Bytes* response) override;
@@ -46,7 +46,7 @@ class BodyService : public BodyServiceOfBytes {
 
   Registry& registry_;
   Admission& admission_;
-  WorkerPool& readers_;
+  TaskPool& readers_;
 };
 
 }  // namespace hulld::server

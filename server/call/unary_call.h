@@ -45,7 +45,7 @@ class UnaryCall : public UnaryReactor {
   // Ends the call with the result of `work`, run on `pool`. Requires: the call has not ended
   // (unchecked: an ended call may have been destroyed).
   template <typename Work>
-  void EndOn(WorkerPool& pool, Work work) {
+  void EndOn(TaskPool& pool, Work work) {
     pool.Submit(
         [this, work = std::move(work)] { End(call_.ShouldStop() ? call_.StopStatus() : work()); },
         call_.client());

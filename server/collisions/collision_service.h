@@ -32,8 +32,8 @@ using CollisionServiceOfBytes = v1::CollisionService::WithRawCallbackMethod_Chec
 // other calls.
 class CollisionService : public CollisionServiceOfBytes {
  public:
-  CollisionService(Registry& registry, Admission& admission, WorkerPool& readers,
-                   WorkerPool& long_readers, TaskPool& pool)
+  CollisionService(Registry& registry, Admission& admission, TaskPool& readers,
+                   TaskPool& long_readers, TaskPool& pool)
       : parts_{registry, admission, readers, long_readers, pool, waiting_} {}
 
   // Number of calls that wait for the store without occupying a thread.

@@ -90,7 +90,7 @@ void CollisionStream::Handle() {
   const absl::Status status = HandleMessage();
   if (!status.ok() || !refresh_.has_value()) return AnswerMessage(status);
   // No thread waits for a store query, because an unresponsive store would block all threads.
-  WorkerPool& threads = messages_ == 0 ? parts_.long_readers : parts_.readers;
+  TaskPool& threads = messages_ == 0 ? parts_.long_readers : parts_.readers;
   const bool awaits = parts_.waiting.AwaitFresh(
       parts_.registry, refresh_->freshness, [this] { return call().ShouldStop(); },
       [this, &threads, self = shared_from_this()](const absl::Status& fresh) {

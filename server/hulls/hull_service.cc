@@ -51,7 +51,7 @@ UnaryReactor* HullService::GetHull(CallContext* context, const Bytes* request, B
       *context, admission_, Rpc::kGetHull, {request, response}, [this](GetCall* call) {
         // The cost of an audit, or of sums over the surface, increases with the hull's size.
         const bool is_long = call->request().audit() || call->request().properties();
-        WorkerPool& readers = is_long ? long_readers_ : readers_;
+        TaskPool& readers = is_long ? long_readers_ : readers_;
         call->EndOn(readers,
                     [this, call] { return Get(call->request(), call->call(), &call->response()); });
       });

@@ -30,8 +30,8 @@ using HullServiceOfBytes = v1::HullService::WithRawCallbackMethod_CreateHull<
 // `writers`. Watches read records on notification, and boxes from the store on `readers`.
 class HullService : public HullServiceOfBytes {
  public:
-  HullService(Registry& registry, Admission& admission, WorkerPool& writers, WorkerPool& readers,
-              WorkerPool& long_readers)
+  HullService(Registry& registry, Admission& admission, TaskPool& writers, TaskPool& readers,
+              TaskPool& long_readers)
       : registry_(registry),
         admission_(admission),
         writers_(writers),
@@ -60,9 +60,9 @@ class HullService : public HullServiceOfBytes {
 
   Registry& registry_;
   Admission& admission_;
-  WorkerPool& writers_;
-  WorkerPool& readers_;
-  WorkerPool& long_readers_;
+  TaskPool& writers_;
+  TaskPool& readers_;
+  TaskPool& long_readers_;
 };
 
 }  // namespace hulld::server

@@ -17,7 +17,7 @@ namespace hulld::server {
 class MeshStream : public RequestStream<PulledStream<WriteReactor, v1::GetHullMeshResponse>,
                                         v1::GetHullMeshRequest> {
  public:
-  MeshStream(CallContext& context, Admission& admission, Registry& registry, WorkerPool& readers,
+  MeshStream(CallContext& context, Admission& admission, Registry& registry, TaskPool& readers,
              const Bytes& request)
       : RequestStream(request, context, admission, Rpc::kGetHullMesh),
         registry_(registry),
@@ -35,7 +35,7 @@ class MeshStream : public RequestStream<PulledStream<WriteReactor, v1::GetHullMe
   void FillFacets(v1::MeshFacets* message);
 
   Registry& registry_;
-  WorkerPool& readers_;
+  TaskPool& readers_;
   // The hull to send, or its simplification.
   std::shared_ptr<const Hull> mesh_;
   size_t next_vertex_ = 0;

@@ -20,7 +20,7 @@ namespace hulld::server {
 class ReplaceStream : public ReadingStream<CallStream<ReadReactor>, v1::ReplaceHullRequest> {
  public:
   // writers: the threads that build the hull. response: owned by gRPC until the call ends.
-  ReplaceStream(CallContext& context, Admission& admission, Registry& registry, WorkerPool& writers,
+  ReplaceStream(CallContext& context, Admission& admission, Registry& registry, TaskPool& writers,
                 Bytes* response)
       : ReadingStream(context, admission, Rpc::kReplaceHull),
         registry_(registry),
@@ -39,7 +39,7 @@ class ReplaceStream : public ReadingStream<CallStream<ReadReactor>, v1::ReplaceH
   void Commit();
 
   Registry& registry_;
-  WorkerPool& writers_;
+  TaskPool& writers_;
   Bytes* const response_;
   // Memory charged for the builder until the registry takes ownership.
   MemoryCharge charge_;

@@ -22,7 +22,7 @@ namespace hulld::server {
 class WatchStream : public RequestStream<PulledStream<WriteReactor, v1::WatchHullsResponse>,
                                          v1::WatchHullsRequest> {
  public:
-  WatchStream(CallContext& context, Admission& admission, Registry& registry, WorkerPool& readers,
+  WatchStream(CallContext& context, Admission& admission, Registry& registry, TaskPool& readers,
               const Bytes& request)
       : RequestStream(request, context, admission, Rpc::kWatchHulls),
         registry_(registry),
@@ -45,7 +45,7 @@ class WatchStream : public RequestStream<PulledStream<WriteReactor, v1::WatchHul
   void Nudge();
 
   Registry& registry_;
-  WorkerPool& readers_;
+  TaskPool& readers_;
   // Guards the assignment and reset of watch_ against threads that cancel.
   std::mutex watch_mutex_;
   std::shared_ptr<Watch> watch_;

@@ -24,7 +24,7 @@ class SharedLoop {
   // Starts to run `work` on disjoint ranges that cover [0, count), on up to `most_helpers` free
   // threads of a pool, without blocking. Finish must follow; `work` is not called after it.
   // Requires step > 0.
-  static std::shared_ptr<SharedLoop> Start(WorkerPool& helpers, size_t max_helpers, size_t count,
+  static std::shared_ptr<SharedLoop> Start(TaskPool& helpers, size_t max_helpers, size_t count,
                                            size_t step, Work work) {
     HULLD_CHECK(step > 0);
     const auto loop = std::make_shared<SharedLoop>(count, step, std::move(work));
@@ -44,7 +44,7 @@ class SharedLoop {
     while (done_ < count_) all_done_.wait(lock);
   }
 
-  static void Run(WorkerPool& helpers, size_t max_helpers, size_t count, size_t step, Work work) {
+  static void Run(TaskPool& helpers, size_t max_helpers, size_t count, size_t step, Work work) {
     Start(helpers, max_helpers, count, step, std::move(work))->Finish({});
   }
 

@@ -116,9 +116,6 @@ class TaskPool {
   std::vector<Thread> threads_;
 };
 
-// A pool without lanes. Its tasks may wait for the store or for a file.
-using WorkerPool = TaskPool;
-
 }  // namespace hulld::server
 
 #endif  // HULLD_SERVER_PROCESS_TASK_POOL_H_

@@ -13,7 +13,7 @@
 
 namespace hulld::server {
 
-Registry::Registry(Store& store, const Limits& limits, WorkerPool& writers,
+Registry::Registry(Store& store, const Limits& limits, TaskPool& writers,
                    std::optional<PoolMetrics> preparers, std::optional<PoolMetrics> loaders)
     : state_(store, limits, preparers),
       committer_(store, state_.mutex),

@@ -73,7 +73,7 @@ class Registry {
   // Chunks are applied on `writers`. Store and pool must outlive this. Requires at destruction: no
   // call is running and no chunk is pending. preparers, loaders: metrics of the queues of hulls to
   // prepare and to read from the store.
-  Registry(Store& store, const Limits& limits, WorkerPool& writers,
+  Registry(Store& store, const Limits& limits, TaskPool& writers,
            std::optional<PoolMetrics> preparers = std::nullopt,
            std::optional<PoolMetrics> loaders = std::nullopt);
   Registry(const Registry&) = delete;
@@ -162,7 +162,7 @@ class Registry {
   RegistryState state_;
   Committer committer_;
   // Threads that read records, and help readers that load many hulls.
-  std::optional<WorkerPool> loaders_;
+  std::optional<TaskPool> loaders_;
   // A PeerSync if the store has peer servers.
   const std::unique_ptr<ReadBarrier> barrier_;
   RecordReader records_;

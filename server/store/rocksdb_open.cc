@@ -277,7 +277,7 @@ absl::Status RocksDbStore::ReadMeta() {
     HULLD_RETURN_IF_ERROR(InitializeMeta());
     return BeginRun();
   }
-  if (**format != kStoreFormat) {
+  if (**format != kStoreFormat && **format != kFormatWithoutBodies) {
     return OtherFormat(absl::StrCat("--data-dir ", options_.data_dir), **format, kStoreFormat);
   }
   const absl::StatusOr<std::optional<std::string>> mark = ReadMigrationMark();

@@ -89,7 +89,7 @@ absl::Status LogLost(const std::string& data_dir, const std::string& finding,
 
 absl::Status OtherFormat(const std::string& where, uint64_t found, uint64_t expected) {
   return absl::FailedPreconditionError(absl::StrCat(where, " is in format ", found,
-                                                    "; this hulld reads only format ", expected,
+                                                    "; this hulld uses format ", expected,
                                                     "; run the hulld version that wrote it"));
 }
 

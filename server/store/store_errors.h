@@ -29,7 +29,8 @@ bool IsDiskFull(const absl::Status& status);
 // finding: names the file.
 absl::Status LogLost(const std::string& data_dir, const std::string& finding,
                      std::optional<uint64_t> revision);
-// FAILED_PRECONDITION: a store is in a format that this hulld does not read. where: names the store.
+// FAILED_PRECONDITION: a store is in a format that this hulld does not read. where: names the
+// store.
 absl::Status OtherFormat(const std::string& where, uint64_t found, uint64_t expected);
 // FAILED_PRECONDITION: a migration to this store is unfinished.
 absl::Status UnfinishedMigration();

@@ -32,8 +32,10 @@ namespace hulld::server {
 // An incarnation is a create_revision. Every value ends in the CRC-32 of key and value, so that
 // readers recognize a value that is damaged or belongs to another key.
 
-// Version of this format. A store in any other format is refused.
+// Version of this format. A store without bodies may be in format 1, which is the same otherwise. A
+// store in any other format is refused.
 inline constexpr uint64_t kStoreFormat = 2;
+inline constexpr uint64_t kFormatWithoutBodies = 1;
 inline constexpr char kFormatKey[] = "m/format";
 inline constexpr char kStoreIdKey[] = "m/store_id";
 inline constexpr char kRevisionKey[] = "m/revision";

@@ -27,7 +27,7 @@ namespace hulld::server {
 // request's freshness: immediately if it already does, otherwise on `pool`. answer: receives the
 // staleness. is_quick: `answer` may run on gRPC's threads; otherwise it runs on `pool`.
 template <typename UnaryCall, typename Answer>
-void EndFresh(Registry& registry, WorkerPool& pool, UnaryCall* call, Answer answer,
+void EndFresh(Registry& registry, TaskPool& pool, UnaryCall* call, Answer answer,
               bool is_quick = true) {
   const absl::StatusOr<Freshness> freshness =
       DecodeFreshness(call->request().freshness(), registry.store(), call->call().arrival());
@@ -46,7 +46,7 @@ void EndFresh(Registry& registry, WorkerPool& pool, UnaryCall* call, Answer answ
 // Ends a unary call that lists records of these kinds, as EndFresh. add: adds an entry to the
 // reply.
 template <typename UnaryCall, typename AddEntry>
-void EndListed(Registry& registry, WorkerPool& pool, UnaryCall* call, Rpc rpc, RecordKinds kinds,
+void EndListed(Registry& registry, TaskPool& pool, UnaryCall* call, Rpc rpc, RecordKinds kinds,
                AddEntry add) {
   const auto answer = [&registry, kinds, call, rpc,
                        add](std::chrono::nanoseconds staleness) -> absl::Status {

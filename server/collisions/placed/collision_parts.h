@@ -13,8 +13,8 @@ struct CollisionParts {
   Registry& registry;
   Admission& admission;
   // For steps that may block: for the hulls of one pair, and for many hulls.
-  WorkerPool& readers;
-  WorkerPool& long_readers;
+  TaskPool& readers;
+  TaskPool& long_readers;
   TaskPool& pool;
   // Waits for freshness without occupying a thread.
   WaitingCalls& waiting;

@@ -50,7 +50,7 @@ class HullChanges : public PeerChangeListener {
  public:
   // All must outlive this. Chunks are built on `writers`.
   HullChanges(RegistryState& state, Committer& committer, ReadBarrier& barrier,
-              RecordReader& records, WorkerPool& writers)
+              RecordReader& records, TaskPool& writers)
       : state_(state),
         committer_(committer),
         barrier_(barrier),
@@ -134,7 +134,7 @@ class HullChanges : public PeerChangeListener {
   Committer& committer_;
   ReadBarrier& barrier_;
   RecordReader& records_;
-  WorkerPool& writers_;
+  TaskPool& writers_;
   // Key of the newest session in RegisteredHull::watches. Guarded by the registry's mutex.
   uint64_t last_watch_ = 0;
 };

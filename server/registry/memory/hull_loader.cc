@@ -62,7 +62,7 @@ absl::StatusOr<std::shared_ptr<LiveHull>> LoadLive(Store& store, const StoredHul
   return MakeLive(stored, store.LoadVertices(stored));
 }
 
-LoadJob::LoadJob(Store& store, std::vector<StoredHull> hulls, WorkerPool& helpers)
+LoadJob::LoadJob(Store& store, std::vector<StoredHull> hulls, TaskPool& helpers)
     : store_(store),
       hulls_(std::move(hulls)),
       order_(hulls_.size()),

@@ -32,7 +32,7 @@ class LoadJob {
   using Loaded = absl::StatusOr<std::shared_ptr<LiveHull>>;
 
   // Starts loading on the threads of the pool, without blocking. Finish must be called.
-  LoadJob(Store& store, std::vector<StoredHull> hulls, WorkerPool& helpers);
+  LoadJob(Store& store, std::vector<StoredHull> hulls, TaskPool& helpers);
   LoadJob(const LoadJob&) = delete;
   LoadJob& operator=(const LoadJob&) = delete;
 

@@ -38,7 +38,7 @@ namespace hulld::server {
 class HullReader {
  public:
   // All must outlive this. loaders: threads that help readers of many hulls.
-  HullReader(RegistryState& state, ReadBarrier& barrier, RecordReader& records, WorkerPool& loaders)
+  HullReader(RegistryState& state, ReadBarrier& barrier, RecordReader& records, TaskPool& loaders)
       : state_(state), barrier_(barrier), records_(records), loaders_(loaders) {}
   HullReader(const HullReader&) = delete;
   HullReader& operator=(const HullReader&) = delete;
@@ -86,7 +86,7 @@ class HullReader {
   RegistryState& state_;
   ReadBarrier& barrier_;
   RecordReader& records_;
-  WorkerPool& loaders_;
+  TaskPool& loaders_;
   // May be null.
   prometheus::Histogram* snapshot_seconds_ = nullptr;
 };

@@ -51,7 +51,7 @@ class RecordReader : public PeerChangeListener, public PageSource {
  public:
   // All must outlive this. loaders: threads for reads without a blocked caller, and for watches.
   RecordReader(RegistryState& state, Committer& committer, ReadBarrier& barrier,
-               WorkerPool& loaders)
+               TaskPool& loaders)
       : state_(state), committer_(committer), barrier_(barrier), loaders_(loaders) {}
   RecordReader(const RecordReader&) = delete;
   RecordReader& operator=(const RecordReader&) = delete;
@@ -141,7 +141,7 @@ class RecordReader : public PeerChangeListener, public PageSource {
   RegistryState& state_;
   Committer& committer_;
   ReadBarrier& barrier_;
-  WorkerPool& loaders_;
+  TaskPool& loaders_;
 
   // Guarded by mutex_: reads that are not over, by ID; the ones not yet taken by a thread; and the
   // number of reading threads.

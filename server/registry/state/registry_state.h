@@ -187,7 +187,7 @@ class RegistryState {
   std::atomic<uint64_t> creating_bodies_ = 0;
   bool has_ended_preparing_ = false;
   // One thread, to leave the CPUs to calls. Ends before the members that it uses.
-  std::optional<WorkerPool> preparer_;
+  std::optional<TaskPool> preparer_;
 };
 
 }  // namespace hulld::server

@@ -134,7 +134,7 @@ class ManyHulls {
     std::fflush(stdout);
   }
 
-  WorkerPool writers_{2};
+  TaskPool writers_{2};
   Registry registry_;
   std::vector<std::string> ids_;
   double heap_before_ = 0;

@@ -4,6 +4,7 @@
 #include <absl/strings/str_cat.h>
 
 #include <utility>
+#include <vector>
 
 #include "core/base/check.h"
 #include "server/store/postgres/postgres_store.h"
@@ -30,7 +31,7 @@ class KeptRocksDb : public KeptStore {
     store_ = store->get();
     return *std::move(store);
   }
-  uint64_t format() const override { return kStoreFormat; }
+  std::vector<uint64_t> formats() const override { return {kFormatWithoutBodies, kStoreFormat}; }
 
   std::string Get(const std::string& key) override {
     std::string value;
@@ -65,7 +66,7 @@ class KeptPostgres : public KeptStore {
     options.conninfo = PostgresCluster::Shared().Conninfo(database_);
     return PostgresStore::Open(std::move(options));
   }
-  uint64_t format() const override { return PostgresStore::kFormat; }
+  std::vector<uint64_t> formats() const override { return {PostgresStore::kFormat}; }
 
   std::string Get(const std::string& key) override {
     const Place place = PlaceOf(key);

@@ -8,6 +8,7 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "server/store/store.h"
 #include "tests/server/harness/store_fixture.h"
@@ -24,7 +25,8 @@ class KeptStore {
   virtual ~KeptStore() = default;
   // Requires: any store opened before is closed.
   virtual absl::StatusOr<std::unique_ptr<Store>> Open() = 0;
-  virtual uint64_t format() const = 0;
+  // The formats that it may be in, ascending; a new store is in the last one.
+  virtual std::vector<uint64_t> formats() const = 0;
 
   // Requires: the store is open.
   virtual std::string Get(const std::string& key) = 0;

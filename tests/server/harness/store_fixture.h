@@ -86,7 +86,7 @@ class TestRegistry {
 
  private:
   std::unique_ptr<StoreType> store_;
-  WorkerPool writers_{2};
+  TaskPool writers_{2};
   Registry registry_;
   absl::Status loaded_;
 };

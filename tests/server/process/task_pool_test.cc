@@ -130,11 +130,11 @@ TEST(TaskPool, ClientsTakeTurnsRegardlessOfTheirLoad) {
                                          "slice b2", "slice a2", "slice A2"));
 }
 
-TEST(WorkerPool, ClientsTakeTurnsRegardlessOfTheirLoad) {
+TEST(TaskPool, SingleCallsOfClientsTakeTurns) {
   Order order;
   {
     std::promise<void> released;
-    WorkerPool pool(1);
+    TaskPool pool(1);
     std::promise<void> held;
     pool.Submit([&] {
       held.set_value();
@@ -200,7 +200,7 @@ TEST(TaskPool, DestructionRunsQueuedTasks) {
 }
 
 TEST(SharedLoop, RunsEachOnce) {
-  WorkerPool helpers(3);
+  TaskPool helpers(3);
   for (const size_t count : {0, 1, 7, 8, 9, 1000}) {
     std::vector<std::atomic<int>> runs(count);
     SharedLoop::Run(helpers, 3, count, 8, [&](size_t begin, size_t end) {
@@ -212,7 +212,7 @@ TEST(SharedLoop, RunsEachOnce) {
 }
 
 TEST(SharedLoop, DoesNotWaitForBusyThreads) {
-  WorkerPool helpers(1);
+  TaskPool helpers(1);
   std::promise<void> free;
   helpers.Submit([ready = free.get_future().share()] { ready.wait(); });
   int runs = 0;
@@ -222,7 +222,7 @@ TEST(SharedLoop, DoesNotWaitForBusyThreads) {
 }
 
 TEST(SharedLoop, WaitsForWorkStartedByAnotherThread) {
-  WorkerPool helpers(1);
+  TaskPool helpers(1);
   std::promise<void> both;
   std::atomic<int> running = 0;
   std::atomic<int> ended = 0;

@@ -196,7 +196,7 @@ class RegistryInterleaving : public ::testing::Test {
   }
 
   ScriptedStore store_;
-  WorkerPool writers_{2};
+  TaskPool writers_{2};
   Registry registry_{store_, Limits(), writers_};
 };
 

@@ -207,7 +207,7 @@ TEST_F(RegistryMemory, ReadersAndWritersGoOnUnderASmallLimit) {
 
 TEST(RegistryOfMemoryStore, RefusesToGrowBeyondTheLimit) {
   MemoryStore store;
-  WorkerPool writers(2);
+  TaskPool writers(2);
   Limits limits;
   limits.memory_limit = 100'000;
   Registry registry(store, limits, writers);
@@ -231,7 +231,7 @@ TEST(RegistryOfMemoryStore, RefusesToGrowBeyondTheLimit) {
 // Points waiting for their turn, and their size after building.
 TEST(RegistryOfMemoryStore, PointsThatWaitCount) {
   MemoryStore store;
-  WorkerPool writers(2);
+  TaskPool writers(2);
   Registry registry(store, Limits(), writers);
   const auto opened = DurableRegistry::Wait<OpenResult>([&](Reply<OpenResult> done) {
     registry.hulls().OpenAppend(
@@ -274,7 +274,7 @@ TEST(RegistryOfMemoryStore, PointsThatWaitCount) {
 
 TEST(RegistryOfMemoryStore, PointsThatAreRefusedCountNoMore) {
   MemoryStore store;
-  WorkerPool writers(2);
+  TaskPool writers(2);
   Limits limits;
   limits.memory_limit = 10'000;
   Registry registry(store, limits, writers);
@@ -296,7 +296,7 @@ TEST(RegistryOfMemoryStore, PointsThatAreRefusedCountNoMore) {
 
 TEST(RegistryOfMemoryStore, MemoryHeldByCallsCountsUntilTheyEnd) {
   MemoryStore store;
-  WorkerPool writers(2);
+  TaskPool writers(2);
   Limits limits;
   limits.memory_limit = 100'000;
   Registry registry(store, limits, writers);

@@ -114,7 +114,7 @@ class RegistryRecords : public ::testing::Test {
   }
 
   VastStore store_;
-  WorkerPool writers_{1};
+  TaskPool writers_{1};
   Limits limits_ = [] {
     Limits limits;
     limits.memory_limit = 1 << 30;

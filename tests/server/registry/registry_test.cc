@@ -62,7 +62,7 @@ class RegistryTest : public ::testing::Test {
   }
 
   CountingStore store_;
-  WorkerPool writers_{2};
+  TaskPool writers_{2};
   Registry registry_{store_, Limits(), writers_};
 };
 
@@ -105,7 +105,7 @@ TEST_F(RegistryTest, AnAcknowledgedChunkIsSeenAtOnce) {
 
 TEST(RegistryTurns, ClientsTakeTurnsAtBuildingChunks) {
   MemoryStore store;
-  WorkerPool writers(1);
+  TaskPool writers(1);
   Registry registry(store, Limits(), writers);
   const auto open = [&](const std::string& id, ClientId client) {
     std::promise<AppendSession> opened;

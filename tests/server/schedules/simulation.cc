@@ -110,7 +110,7 @@ void SimulateServers(const Plan& plan, SimulatedStore& database, Reached& reache
   Event all_ended;
   const auto serve = [&] {
     SharedStore store(database);
-    WorkerPool writers(2);
+    TaskPool writers(2);
     Registry registry(store, limits, writers);
     if (plan.finds_records) registry.KeepRecords(plan.records);
     if (!registry.Load().ok())
@@ -207,7 +207,7 @@ void Simulate(Reached& reached) {
   Limits limits;
   limits.memory_limit = plan.memory_limit;
   const auto run = [&](const auto& body) {
-    WorkerPool writers(2);
+    TaskPool writers(2);
     Registry registry(store, limits, writers);
     if (plan.finds_records) registry.KeepRecords(plan.records);
     if (!registry.Load().ok())

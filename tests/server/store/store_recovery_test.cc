@@ -245,8 +245,13 @@ TEST_F(RocksDbRecovery, ASecondServerIsRefused) {
 }
 
 TEST_P(StoreRecovery, AnOlderOrNewerFormatIsRefused) {
-  const uint64_t format = kept_->format();
-  for (const uint64_t other : {format - 1, format + 1}) {
+  const std::vector<uint64_t> formats = kept_->formats();
+  Start();
+  for (const uint64_t format : formats) {
+    kept_->SetFormat(format);
+    Start();
+  }
+  for (const uint64_t other : {formats.front() - 1, formats.back() + 1}) {
     SetUp();
     Start();
     kept_->SetFormat(other);
@@ -254,8 +259,8 @@ TEST_P(StoreRecovery, AnOlderOrNewerFormatIsRefused) {
     const auto store = kept_->Open();
     EXPECT_EQ(store.status().code(), absl::StatusCode::kFailedPrecondition);
     EXPECT_THAT(std::string(store.status().message()),
-                HasSubstr(absl::StrCat("is in format ", other, "; this hulld reads only format ",
-                                       format, "; run the hulld version that wrote it")));
+                HasSubstr(absl::StrCat("is in format ", other, "; this hulld uses format ",
+                                       formats.back(), "; run the hulld version that wrote it")));
   }
 }
 
