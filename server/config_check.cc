@@ -8,6 +8,7 @@
 #include <system_error>
 
 #include "core/base/check.h"
+#include "core/base/status_macros.h"
 #include "server/access/secret_file.h"
 #include "server/access/tls_identity.h"
 #include "server/access/token_table.h"
@@ -19,11 +20,8 @@
 namespace hulld::server {
 
 absl::Status CheckListening(const Config& config) {
-  const absl::StatusOr<ListenAddress> address = ParseListenAddress(config.listen);
-  if (!address.ok()) return address.status();
-  if (absl::Status s = CheckExposure(*address, config.has_tls(), config.insecure); !s.ok()) {
-    return s;
-  }
+  HULLD_ASSIGN_OR_RETURN(const ListenAddress address, ParseListenAddress(config.listen));
+  HULLD_RETURN_IF_ERROR(CheckExposure(address, config.has_tls(), config.insecure));
   if (config.metrics_address.empty()) return absl::OkStatus();
   return ParseMetricsAddress(config.metrics_address, config.metrics_insecure).status();
 }
@@ -31,19 +29,18 @@ absl::Status CheckListening(const Config& config) {
 absl::StatusOr<std::vector<std::string>> CheckConfig(const Config& config,
                                                      std::chrono::system_clock::time_point now) {
   std::vector<std::string> findings;
-  if (absl::Status s = CheckListening(config); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(CheckListening(config));
   if (config.store == "rocksdb" && !config.data_dir.empty()) {
-    if (absl::Status s = CheckDataDir(config.data_dir); !s.ok()) return s;
+    HULLD_RETURN_IF_ERROR(CheckDataDir(config.data_dir));
   }
   if (config.store == "postgres") {
-    if (absl::Status s = CheckConninfoFile(config.postgres_conninfo_file); !s.ok()) return s;
+    HULLD_RETURN_IF_ERROR(CheckConninfoFile(config.postgres_conninfo_file));
   }
   if (config.has_tls()) {
-    const absl::StatusOr<TlsIdentity> identity = LoadTlsIdentity(config);
-    if (!identity.ok()) return identity.status();
-    if (absl::Status s = CheckValidity(*identity, now); !s.ok()) return s;
-    findings.push_back(absl::StrCat("TLS certificate of ", identity->subject, ", valid until ",
-                                    FormatTime(identity->not_after)));
+    HULLD_ASSIGN_OR_RETURN(const TlsIdentity identity, LoadTlsIdentity(config));
+    HULLD_RETURN_IF_ERROR(CheckValidity(identity, now));
+    findings.push_back(absl::StrCat("TLS certificate of ", identity.subject, ", valid until ",
+                                    FormatTime(identity.not_after)));
   }
   if (!config.tokens_file.empty()) {
     const absl::StatusOr<TokenTable> tokens = ReadTokensFile(config.tokens_file);
@@ -76,9 +73,8 @@ absl::Status CheckDataDir(const std::string& path) {
 }
 
 absl::Status CheckConninfoFile(const std::string& path, const char* setting) {
-  const absl::StatusOr<std::string> text = ReadSecretFile(path, setting);
-  if (!text.ok()) return text.status();
-  return Prefixed(absl::StrCat(setting, " ", path, ": "), Conninfo::Parse(*text).status());
+  HULLD_ASSIGN_OR_RETURN(const std::string text, ReadSecretFile(path, setting));
+  return Prefixed(absl::StrCat(setting, " ", path, ": "), Conninfo::Parse(text).status());
 }
 
 std::vector<std::string> ExposureWarnings(const Config& config) {

@@ -14,6 +14,7 @@
 #include <thread>
 #include <utility>
 
+#include "core/base/status_macros.h"
 #include "server/access/secret_file.h"
 #include "server/call/transport.h"
 #include "server/config_check.h"
@@ -55,10 +56,9 @@ int AnswerThreads(const Config& config) {
 absl::StatusOr<std::unique_ptr<Store>> OpenPostgres(const Config& config,
                                                     const std::function<bool()>& should_stop) {
   PostgresOptions options;
-  absl::StatusOr<std::string> conninfo =
-      ReadSecretFile(config.postgres_conninfo_file, PostgresOptions::kSetting);
-  if (!conninfo.ok()) return conninfo.status();
-  options.conninfo = *std::move(conninfo);
+  HULLD_ASSIGN_OR_RETURN(std::string conninfo,
+                         ReadSecretFile(config.postgres_conninfo_file, PostgresOptions::kSetting));
+  options.conninfo = std::move(conninfo);
   options.take_over = config.take_over;
   options.shared = config.postgres_servers == "many";
   options.should_stop = should_stop;
@@ -212,25 +212,22 @@ void Server::AddSizesToMetrics() {
 
 absl::StatusOr<std::unique_ptr<Server>> Server::Start(const Config& config,
                                                       std::function<bool()> should_stop) {
-  absl::StatusOr<std::unique_ptr<Guard>> guard = Guard::Load(config);
-  if (!guard.ok()) return guard.status();
-  absl::StatusOr<std::unique_ptr<Store>> store = OpenStore(config, should_stop);
-  if (!store.ok()) return store.status();
-  std::unique_ptr<Server> server(new Server(config, *std::move(guard), *std::move(store)));
-  if (absl::Status s = server->registry_.Load(); !s.ok()) return s;
-  if (absl::Status s = server->Listen(config); !s.ok()) return s;
+  HULLD_ASSIGN_OR_RETURN(std::unique_ptr<Guard> guard, Guard::Load(config));
+  HULLD_ASSIGN_OR_RETURN(std::unique_ptr<Store> store, OpenStore(config, should_stop));
+  std::unique_ptr<Server> server(new Server(config, std::move(guard), std::move(store)));
+  HULLD_RETURN_IF_ERROR(server->registry_.Load());
+  HULLD_RETURN_IF_ERROR(server->Listen(config));
   return server;
 }
 
 absl::Status Server::Listen(const Config& config) {
-  if (absl::Status s = CheckListening(config); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(CheckListening(config));
   const absl::StatusOr<ListenAddress> address = ParseListenAddress(config.listen);
-  if (absl::Status s = CheckSocketFree(*address); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(CheckSocketFree(*address));
 
   grpc::ServerBuilder builder;
-  auto acceptor = ConnectionAcceptor::Listen(*address, connection_table_, metrics_);
-  if (!acceptor.ok()) return acceptor.status();
-  acceptor_ = *std::move(acceptor);
+  HULLD_ASSIGN_OR_RETURN(acceptor_,
+                         ConnectionAcceptor::Listen(*address, connection_table_, metrics_));
   auto connections = builder.experimental().AddExternalConnectionAcceptor(
       grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD,
       guard_->credentials());
@@ -249,10 +246,9 @@ absl::Status Server::Listen(const Config& config) {
   const FrameLimits frames;
   acceptor_->Start(std::move(connections), config.has_tls() ? nullptr : &frames);
   if (config.metrics_address.empty()) return absl::OkStatus();
-  absl::StatusOr<std::unique_ptr<MetricsEndpoint>> endpoint =
-      MetricsEndpoint::Start(config.metrics_address, config.metrics_insecure, metrics_);
-  if (!endpoint.ok()) return endpoint.status();
-  metrics_endpoint_ = *std::move(endpoint);
+  HULLD_ASSIGN_OR_RETURN(
+      metrics_endpoint_,
+      MetricsEndpoint::Start(config.metrics_address, config.metrics_insecure, metrics_));
   return absl::OkStatus();
 }
 

@@ -6,6 +6,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "core/base/status_macros.h"
 #include "server/access/caller.h"
 #include "server/contract/limit_error.h"
 #include "server/contract/status_map.h"
@@ -20,7 +21,7 @@ namespace {
 
 absl::StatusOr<StoredBody> DecodeBody(const v1::PutBodyRequest& request, const Caller& caller,
                                       uint64_t max_pieces) {
-  if (absl::Status s = CheckHullId(caller, request.body_id(), "body_id"); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(CheckHullId(caller, request.body_id(), "body_id"));
   if (request.pieces().empty()) {
     return absl::InvalidArgumentError(
         "pieces is empty; a body needs at least one piece (use DeleteBody to remove a body)");
@@ -146,14 +147,14 @@ void BodyService::Put(PutCall* call) {
 absl::Status BodyService::Get(const v1::GetBodyRequest& request, const Call& call,
                               std::chrono::nanoseconds staleness, v1::GetBodyResponse* response) {
   const std::string& id = request.body_id();
-  if (absl::Status s = CheckHullId(call.caller(), id, "body_id"); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(CheckHullId(call.caller(), id, "body_id"));
   const FoundBodies found =
       registry_.bodies().Find(std::span(&id, 1), [&call] { return call.ShouldStop(); });
   if (!found.status.ok()) return found.status;
   const std::shared_ptr<const Body>& body = found.bodies.front();
   if (body == nullptr) return BodyNotFound(id);
   if (!body->damage().ok()) return body->damage();
-  if (absl::Status s = CheckPiecePrefix(*body, call.caller().prefix); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(CheckPiecePrefix(*body, call.caller().prefix));
   EncodeHeader(registry_.store(), AsOf{found.store_revision, staleness},
                response->mutable_header());
   EncodeBody(body->Describe(), response->mutable_body());

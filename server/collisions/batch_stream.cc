@@ -1,5 +1,6 @@
 #include "server/collisions/batch_stream.h"
 
+#include "core/base/status_macros.h"
 #include "core/query/collision.h"
 #include "server/collisions/placed/query_settings.h"
 #include "server/wire/answer_columns.h"
@@ -27,7 +28,7 @@ BatchStream::BatchStream(CallContext& context, const CollisionParts& parts, cons
                      .joins_head = true}) {}
 
 absl::Status BatchStream::Validate() {
-  if (absl::Status s = DecodePlacements(request().method(), "the batch"); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(DecodePlacements(request().method(), "the batch"));
   expected_pairs_ = CountUnits();
   // Each placement is used at most twice on average, so placing it again costs less than memory for
   // all of them.
@@ -69,7 +70,7 @@ absl::Status BatchStream::Step(PairsPiece& piece, Clock::time_point end) {
   if (is_plain_) return AnswerRelation(a, b, piece);
   if (!piece.search.has_value()) {
     piece.search.emplace(table_, a, b, query_, motion_options_);
-    if (absl::Status s = piece.search->CheckMemory(registry()); !s.ok()) return s;
+    HULLD_RETURN_IF_ERROR(piece.search->CheckMemory(registry()));
   }
   if (!piece.search->Advance(end)) return absl::OkStatus();
   const PlacedAnswer& found = piece.search->answer();

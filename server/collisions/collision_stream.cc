@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/base/check.h"
+#include "core/base/status_macros.h"
 #include "core/query/collision.h"
 #include "server/collisions/placed/placed_answer.h"
 #include "server/collisions/placed/query_settings.h"
@@ -129,30 +130,27 @@ absl::Status CollisionStream::HandleMessage() {
 
 absl::Status CollisionStream::HandleOpen() {
   v1::CollisionStreamOpen& open = *request().mutable_open();
-  absl::StatusOr<QueryOptions> options =
-      MakeQueryOptions(v1::METHOD_UNSPECIFIED, open.wanted(), open.tolerance(),
-                       parts_.registry.limits(), call().lifetime());
-  if (!options.ok()) return options.status();
-  const absl::StatusOr<Freshness> freshness =
-      DecodeFreshness(open.freshness(), parts_.registry.store(), call().message_arrival());
-  if (!freshness.ok()) return freshness.status();
-  freshness_ = *freshness;
+  HULLD_ASSIGN_OR_RETURN(QueryOptions options,
+                         MakeQueryOptions(v1::METHOD_UNSPECIFIED, open.wanted(), open.tolerance(),
+                                          parts_.registry.limits(), call().lifetime()));
+  HULLD_ASSIGN_OR_RETURN(freshness_, DecodeFreshness(open.freshness(), parts_.registry.store(),
+                                                     call().message_arrival()));
   const absl::Status resting =
       RefuseMotions(open.placements(), open.packed_placements(), "a stream");
   if (!resting.ok()) return resting;
-  absl::StatusOr<PlacementTable> table =
+  HULLD_ASSIGN_OR_RETURN(
+      PlacementTable table,
       PlacementTable::Make(open.placements(), *open.mutable_packed_placements(), call().caller(),
-                           parts_.registry.limits().max_placements, "the stream");
-  if (!table.ok()) return table.status();
+                           parts_.registry.limits().max_placements, "the stream"));
   const absl::Status valid = ValidatePairs(
-      open.pairs(), table->size(), parts_.registry.limits().max_pairs_per_batch, "the stream");
+      open.pairs(), table.size(), parts_.registry.limits().max_pairs_per_batch, "the stream");
   if (!valid.ok()) return valid;
-  options_ = *std::move(options);
+  options_ = std::move(options);
   wanted_ = open.wanted();
   only_changes_ = open.only_changes();
-  table_ = *std::move(table);
+  table_ = std::move(table);
 
-  if (absl::Status s = ChargeFor(static_cast<size_t>(open.pairs_size()) / 2); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(ChargeFor(static_cast<size_t>(open.pairs_size()) / 2));
   pairs_ = LivePairs(open.pairs(), table_.size(), v1::RELATION_UNSPECIFIED);
   open_ = true;
   pairs_.SelectAll();
@@ -172,9 +170,7 @@ absl::Status CollisionStream::ChargeFor(size_t pairs) {
 
 // Validates the whole update before applying any of it.
 absl::Status CollisionStream::HandleUpdate(const v1::CollisionStreamUpdate& update) {
-  if (absl::Status s = ValidateMoves(update.placements(), update.poses(), table_.size()); !s.ok()) {
-    return s;
-  }
+  HULLD_RETURN_IF_ERROR(ValidateMoves(update.placements(), update.poses(), table_.size()));
   for (int i = 0; i < update.placements_size(); ++i) {
     const uint32_t placement = update.placements(i);
     const Pose pose = ReadPose(update.poses(), static_cast<size_t>(i));
@@ -190,9 +186,9 @@ absl::Status CollisionStream::HandleUpdate(const v1::CollisionStreamUpdate& upda
 }
 
 absl::Status CollisionStream::Refresh(const ReadPlan& plan) {
-  if (absl::Status s = table_.Refresh(parts_.registry, options_, plan); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(table_.Refresh(parts_.registry, options_, plan));
   if (table_.has_bodies()) {
-    if (absl::Status s = ChargeFor(pairs_.size()); !s.ok()) return s;
+    HULLD_RETURN_IF_ERROR(ChargeFor(pairs_.size()));
   }
   for (uint32_t i = 0; i < table_.size(); ++i) {
     if (table_.hull_changed(i)) pairs_.SelectPairsOf(i);

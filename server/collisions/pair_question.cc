@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/status_macros.h"
 #include "server/collisions/placed/query_settings.h"
 #include "server/process/metrics.h"
 #include "server/registry/catalog/body.h"
@@ -64,19 +65,14 @@ void PairQuestion::Start(const CollisionParts& parts, CheckCall* call) {
 absl::Status PairQuestion::ReadRequest() {
   const v1::CheckCollisionRequest& request = call_->request();
   const Call& call = call_->call();
-  absl::StatusOr<QueryOptions> options =
-      MakeQueryOptions(request.method(), request.wanted(), request.tolerance(),
-                       parts_.registry.limits(), call.lifetime());
-  if (!options.ok()) return options.status();
-  options_ = *std::move(options);
+  HULLD_ASSIGN_OR_RETURN(options_,
+                         MakeQueryOptions(request.method(), request.wanted(), request.tolerance(),
+                                          parts_.registry.limits(), call.lifetime()));
   if (!request.has_a() || !request.has_b()) {
     return absl::InvalidArgumentError(
         absl::StrCat(request.has_a() ? "b" : "a", " is missing; give a hull ID or points"));
   }
-  absl::StatusOr<PlacementTable> table =
-      PlacementTable::MakePair(request.a(), request.b(), call.caller());
-  if (!table.ok()) return table.status();
-  table_ = *std::move(table);
+  HULLD_ASSIGN_OR_RETURN(table_, PlacementTable::MakePair(request.a(), request.b(), call.caller()));
   const bool is_of_a = request.a().radius() > 0;
   const double radius = is_of_a ? request.a().radius() : request.b().radius();
   if (options_.method == Method::kTextbookSat && radius > 0) {
@@ -85,13 +81,13 @@ absl::Status PairQuestion::ReadRequest() {
         ", but METHOD_TEXTBOOK_SAT applies to hulls without a radius; omit one of them"));
   }
   if (table_.has_motions()) {
-    if (absl::Status s = ValidateForMotions(options_); !s.ok()) return s;
+    HULLD_RETURN_IF_ERROR(ValidateForMotions(options_));
     motion_options_ = MakeMotionOptions(request.wanted(), options_);
   }
-  const absl::StatusOr<Freshness> freshness =
-      DecodeFreshness(request.freshness(), parts_.registry.store(), call.arrival());
-  if (!freshness.ok()) return freshness.status();
-  plan_.freshness = *freshness;
+  HULLD_ASSIGN_OR_RETURN(
+      const Freshness freshness,
+      DecodeFreshness(request.freshness(), parts_.registry.store(), call.arrival()));
+  plan_.freshness = freshness;
   return absl::OkStatus();
 }
 
@@ -168,7 +164,7 @@ absl::Status PairQuestion::Encode() {
     counts.Add(found.answer->rung);
     call_->call().metrics().CountPairs(counts);
     const v1::Wanted& wanted = call_->request().wanted();
-    if (absl::Status s = EncodeAnswer(*found.answer, a, b, wanted, &response); !s.ok()) return s;
+    HULLD_RETURN_IF_ERROR(EncodeAnswer(*found.answer, a, b, wanted, &response));
   }
   return table_.has_bodies() && options_.want_certificate ? EncodeProof() : absl::OkStatus();
 }

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "core/base/check.h"
+#include "core/base/status_macros.h"
 #include "server/call/queued_stream.h"
 #include "server/collisions/placed/collision_parts.h"
 #include "server/collisions/placed/placement_table.h"
@@ -127,22 +128,16 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   // For Validate: decodes the query, its freshness, and the placements. what: as in "the batch".
   absl::Status DecodePlacements(v1::Method method, const char* what) {
     const Request& request = this->request();
-    absl::StatusOr<QueryOptions> query =
-        MakeQueryOptions(method, request.wanted(), request.tolerance(), registry().limits(),
-                         this->call().lifetime());
-    if (!query.ok()) return query.status();
-    query_ = *std::move(query);
-    const absl::StatusOr<Freshness> freshness =
-        DecodeFreshness(request.freshness(), registry().store(), this->call().arrival());
-    if (!freshness.ok()) return freshness.status();
-    freshness_ = *freshness;
-    absl::StatusOr<PlacementTable> table =
+    HULLD_ASSIGN_OR_RETURN(query_, MakeQueryOptions(method, request.wanted(), request.tolerance(),
+                                                    registry().limits(), this->call().lifetime()));
+    HULLD_ASSIGN_OR_RETURN(freshness_, DecodeFreshness(request.freshness(), registry().store(),
+                                                       this->call().arrival()));
+    HULLD_ASSIGN_OR_RETURN(
+        table_,
         PlacementTable::Make(request.placements(), *this->own_request().mutable_packed_placements(),
-                             this->call().caller(), registry().limits().max_placements, what);
-    if (!table.ok()) return table.status();
-    table_ = *std::move(table);
+                             this->call().caller(), registry().limits().max_placements, what));
     if (!table_.has_motions()) return absl::OkStatus();
-    if (absl::Status s = ValidateForMotions(query_); !s.ok()) return s;
+    HULLD_RETURN_IF_ERROR(ValidateForMotions(query_));
     motion_options_ = MakeMotionOptions(request.wanted(), query_);
     return absl::OkStatus();
   }
@@ -284,7 +279,7 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     const uint64_t steps = StepsPerLook();
     do {
       for (uint64_t left = steps; left > 0 && !piece.is_done(); --left) {
-        if (absl::Status s = Step(piece, end); !s.ok()) return s;
+        HULLD_RETURN_IF_ERROR(Step(piece, end));
       }
     } while (!piece.is_done() && Clock::now() < end);
     return absl::OkStatus();

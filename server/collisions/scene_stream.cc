@@ -4,6 +4,7 @@
 #include <memory>
 #include <utility>
 
+#include "core/base/status_macros.h"
 #include "core/query/collision.h"
 #include "server/collisions/placed/query_settings.h"
 #include "server/collisions/placed/scene_groups.h"
@@ -50,8 +51,8 @@ SceneStream::SceneStream(CallContext& context, const CollisionParts& parts, cons
                      .joins_head = false}) {}
 
 absl::Status SceneStream::Validate() {
-  if (absl::Status s = DecodePlacements(v1::METHOD_UNSPECIFIED, "the scene"); !s.ok()) return s;
-  if (absl::Status s = ValidateGroups(request(), table_.size()); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(DecodePlacements(v1::METHOD_UNSPECIFIED, "the scene"));
+  HULLD_RETURN_IF_ERROR(ValidateGroups(request(), table_.size()));
   ignored_groups_ = IgnoredGroups(request());
   options_.ignored_groups = ignored_groups_;
   options_.groups = {request().groups().data(), static_cast<size_t>(request().groups_size())};
@@ -121,11 +122,9 @@ absl::Status SceneStream::Prepare() {
     motion_options_.want_certificate = false;
   }
   options_.query = query_;
-  absl::StatusOr<SceneSearch> search =
-      moves ? SceneSearch::Make(table_.placed(), options_, std::move(moving))
-            : SceneSearch::Make(table_.placed(), options_, std::move(boxes));
-  if (!search.ok()) return search.status();
-  search_ = *std::move(search);
+  HULLD_ASSIGN_OR_RETURN(search_,
+                         moves ? SceneSearch::Make(table_.placed(), options_, std::move(moving))
+                               : SceneSearch::Make(table_.placed(), options_, std::move(boxes)));
   call().AddPairs(search_->pairs());
   return absl::OkStatus();
 }
@@ -161,11 +160,10 @@ absl::Status SceneStream::Step(ScenePiece& piece, Clock::time_point /*end*/) {
     OpenBodies(a, *b, piece);
     return absl::OkStatus();
   }
-  absl::StatusOr<PlacedAnswer> found = AskCandidate(a, *b, piece);
-  if (!found.ok()) return found.status();
-  if (found->answer.ok() && !search_->IsFound(*found->answer)) return absl::OkStatus();
-  if (ranking_ != nullptr) return Rank(a, *b, *std::move(found), piece);
-  ++piece.counts.found[AddFound(a, *b, *found, piece)];
+  HULLD_ASSIGN_OR_RETURN(PlacedAnswer found, AskCandidate(a, *b, piece));
+  if (found.answer.ok() && !search_->IsFound(*found.answer)) return absl::OkStatus();
+  if (ranking_ != nullptr) return Rank(a, *b, std::move(found), piece);
+  ++piece.counts.found[AddFound(a, *b, found, piece)];
   return absl::OkStatus();
 }
 

@@ -4,6 +4,7 @@
 
 #include <memory>
 
+#include "core/base/status_macros.h"
 #include "core/hull/audit.h"
 #include "core/hull/properties.h"
 #include "server/call/unary_call.h"
@@ -104,14 +105,11 @@ void HullService::Create(CreateCall* call) {
 
 absl::Status HullService::Get(const v1::GetHullRequest& request, const Call& call,
                               v1::GetHullResponse* response) {
-  if (absl::Status s = CheckHullId(call.caller(), request.hull_id(), "hull_id"); !s.ok()) {
-    return s;
-  }
-  const absl::StatusOr<Freshness> freshness =
-      DecodeFreshness(request.freshness(), registry_.store(), call.arrival());
-  if (!freshness.ok()) return freshness.status();
+  HULLD_RETURN_IF_ERROR(CheckHullId(call.caller(), request.hull_id(), "hull_id"));
+  HULLD_ASSIGN_OR_RETURN(const Freshness freshness,
+                         DecodeFreshness(request.freshness(), registry_.store(), call.arrival()));
   const auto resolved = registry_.Resolve(
-      request.hull_id(), [&call] { return call.ShouldStop(); }, *freshness);
+      request.hull_id(), [&call] { return call.ShouldStop(); }, freshness);
   if (!resolved.ok()) return resolved.status();
   const auto& [as_of, view] = *resolved;
   EncodeHeader(registry_.store(), as_of, response->mutable_header());
@@ -120,19 +118,17 @@ absl::Status HullService::Get(const v1::GetHullRequest& request, const Call& cal
   const bool wants_properties = request.properties() && !view.served->empty();
   if (request.without_facets() && !request.audit() && !wants_properties) return absl::OkStatus();
   const auto should_stop = [&call] { return call.ShouldStop(); };
-  const absl::StatusOr<const Hull*> hull = registry_.reader().Canonical(view, should_stop);
-  if (!hull.ok()) return hull.status();
+  HULLD_ASSIGN_OR_RETURN(const Hull* hull, registry_.reader().Canonical(view, should_stop));
   if (!request.without_facets()) {
-    response->set_edge_count((*hull)->edges().size());
-    response->set_facet_count((*hull)->facet_count());
+    response->set_edge_count(hull->edges().size());
+    response->set_facet_count(hull->facet_count());
   }
   if (wants_properties) {
-    const absl::StatusOr<HullProperties> properties = ComputeProperties(**hull, should_stop);
-    if (!properties.ok()) return properties.status();
-    EncodeProperties(*properties, response->mutable_properties());
+    HULLD_ASSIGN_OR_RETURN(const HullProperties properties, ComputeProperties(*hull, should_stop));
+    EncodeProperties(properties, response->mutable_properties());
   }
   if (!request.audit()) return absl::OkStatus();
-  const absl::Status finding = AuditHull(**hull, should_stop);
+  const absl::Status finding = AuditHull(*hull, should_stop);
   if (absl::IsCancelled(finding)) return finding;
   response->mutable_audit()->set_ok(finding.ok());
   if (!finding.ok()) response->mutable_audit()->set_finding(std::string(finding.message()));

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/base/status_macros.h"
 #include "core/hull/simplification/simplify.h"
 #include "server/contract/status_map.h"
 #include "server/settings/config.h"
@@ -33,22 +34,21 @@ absl::Status MeshStream::MakeHeader() {
   absl::Status valid = CheckHullId(call().caller(), request().hull_id(), "hull_id");
   if (!valid.ok()) return valid;
   const auto should_stop = [this] { return call().ShouldStop(); };
-  const absl::StatusOr<Freshness> freshness =
-      DecodeFreshness(request().freshness(), registry_.store(), call().arrival());
-  if (!freshness.ok()) return freshness.status();
-  const auto resolved = registry_.Resolve(request().hull_id(), should_stop, *freshness);
-  if (!resolved.ok()) return resolved.status();
-  const absl::StatusOr<const Hull*> hull =
-      registry_.reader().Canonical(resolved->second, should_stop);
-  if (!hull.ok()) return hull.status();
-  mesh_ = std::shared_ptr<const Hull>(resolved->second.served, *hull);
+  HULLD_ASSIGN_OR_RETURN(
+      const Freshness freshness,
+      DecodeFreshness(request().freshness(), registry_.store(), call().arrival()));
+  HULLD_ASSIGN_OR_RETURN(const auto resolved,
+                         registry_.Resolve(request().hull_id(), should_stop, freshness));
+  HULLD_ASSIGN_OR_RETURN(const Hull* hull,
+                         registry_.reader().Canonical(resolved.second, should_stop));
+  mesh_ = std::shared_ptr<const Hull>(resolved.second.served, hull);
   v1::MeshHeader* header = reply().mutable_header();
   if (request().has_simplification()) {
     const absl::Status simplified = Simplify(request().simplification(), header);
     if (!simplified.ok()) return Prefixed("simplification: ", simplified);
   }
-  EncodeHeader(registry_.store(), resolved->first, header->mutable_header());
-  EncodeRecord(resolved->second.record, header->mutable_hull());
+  EncodeHeader(registry_.store(), resolved.first, header->mutable_header());
+  EncodeRecord(resolved.second.record, header->mutable_hull());
   header->set_facet_count(mesh_->facet_count());
   header->set_vertex_count(mesh_->vertices().size());
   return absl::OkStatus();

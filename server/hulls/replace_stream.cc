@@ -5,6 +5,7 @@
 #include <chrono>
 #include <utility>
 
+#include "core/base/status_macros.h"
 #include "server/contract/limit_error.h"
 #include "server/contract/status_map.h"
 #include "server/wire/decode.h"
@@ -57,9 +58,7 @@ absl::Status ReplaceStream::HandleMessage() {
 }
 
 absl::Status ReplaceStream::HandleOpen(const v1::ReplaceOpen& open) {
-  if (absl::Status s = CheckHullId(call().caller(), open.hull_id(), "open.hull_id"); !s.ok()) {
-    return s;
-  }
+  HULLD_RETURN_IF_ERROR(CheckHullId(call().caller(), open.hull_id(), "open.hull_id"));
   replacement_.hull_id = open.hull_id();
   replacement_.if_revision = IfRevision(open);
   replacement_.create_if_absent = open.create_if_absent();

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/base/check.h"
+#include "core/base/status_macros.h"
 #include "server/wire/encode.h"
 
 namespace hulld::server {
@@ -80,9 +81,8 @@ void WatchStream::Begin(const WatchTarget& target, const WatchPosition& position
 
 absl::StatusOr<WatchTarget> WatchStream::ReadTarget() const {
   if (request().hull_id().empty()) {
-    absl::StatusOr<std::string> prefix = PrefixToList(call().caller(), request().prefix());
-    if (!prefix.ok()) return prefix.status();
-    return WatchTarget{*std::move(prefix), {}, request().bodies()};
+    HULLD_ASSIGN_OR_RETURN(std::string prefix, PrefixToList(call().caller(), request().prefix()));
+    return WatchTarget{std::move(prefix), {}, request().bodies()};
   }
   if (!request().prefix().empty()) {
     return absl::InvalidArgumentError("prefix and hull_id are both set; set one of them");

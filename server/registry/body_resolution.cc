@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/base/status_macros.h"
 #include "server/contract/error_info.h"
 #include "server/contract/status_map.h"
 
@@ -41,12 +42,12 @@ using FindHull = std::function<const absl::StatusOr<HullView>&(const std::string
 absl::StatusOr<HullView> ServeBody(Registry& registry, const std::shared_ptr<const Body>& body,
                                    const PlacedLookup& lookup, const FindHull& find_hull) {
   if (!body->damage().ok()) return body->damage();
-  if (absl::Status s = CheckPiecePrefix(*body, lookup.prefix); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(CheckPiecePrefix(*body, lookup.prefix));
   constexpr size_t kPerHull = sizeof(HullView) + sizeof(const QueryHull*) + 2 * sizeof(uint64_t);
   MemoryCharge charge(
       registry.memory(), MemoryUse::kReading,
       body->pieces().size() * sizeof(BodyPiece) + body->hull_ids().size() * kPerHull);
-  if (absl::Status s = registry.CheckMemory(MemoryUse::kReading); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(registry.CheckMemory(MemoryUse::kReading));
   std::vector<HullView> hulls;
   std::vector<const QueryHull*> query_hulls;
   std::vector<uint64_t> revisions;
@@ -177,10 +178,7 @@ absl::StatusOr<Resolved> RefreshPlaced(Registry& registry, std::span<const std::
   const bool may_wait = lookup.plan.may_wait;
   if (lookup.shapes != nullptr && !lookup.shapes->empty() && known.shapes_.empty()) {
     if (!may_wait) return WouldWait();
-    absl::StatusOr<std::vector<HullView>> built =
-        BuildInlineShapes(registry, *lookup.shapes, should_stop);
-    if (!built.ok()) return built.status();
-    known.shapes_ = *std::move(built);
+    HULLD_ASSIGN_OR_RETURN(known.shapes_, BuildInlineShapes(registry, *lookup.shapes, should_stop));
   }
   absl::StatusOr<Bodies> bodies = BodiesAmong(registry, ids, should_stop, may_wait);
   absl::StatusOr<Resolved> hulls;

@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "core/base/check.h"
+#include "core/base/status_macros.h"
 #include "core/hull/growth/hull_builder.h"
 #include "server/contract/stopped_call.h"
 #include "server/registry/memory/memory_budget.h"
@@ -46,7 +47,7 @@ absl::StatusOr<std::vector<HullView>> BuildInlineShapes(Registry& registry,
   for (size_t k = 0; k < shapes.size(); ++k) {
     if (Stopped(should_stop)) return Cancelled();
     if (unchecked_bytes > kUncheckedBytes) {
-      if (absl::Status s = registry.CheckMemory(MemoryUse::kReading); !s.ok()) return s;
+      HULLD_RETURN_IF_ERROR(registry.CheckMemory(MemoryUse::kReading));
       unchecked_bytes = 0;
     }
     const auto hull = BuildInlineHull(shapes.PointsOf(k), registry.memory());

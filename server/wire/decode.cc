@@ -11,6 +11,7 @@
 #include <limits>
 #include <optional>
 
+#include "core/base/status_macros.h"
 #include "server/contract/error_info.h"
 #include "server/contract/limit_error.h"
 #include "server/contract/status_map.h"
@@ -107,11 +108,10 @@ absl::Status CheckShape(std::span<const Vector> points) {
 }
 
 absl::Status DecodeShape(const v1::PointBlock& block, InlineShapes* shapes) {
-  const absl::StatusOr<std::vector<Vector>> points =
-      DecodePoints(block, std::numeric_limits<uint64_t>::max());
-  if (!points.ok()) return points.status();
-  if (absl::Status s = CheckShape(*points); !s.ok()) return s;
-  shapes->Add(*points);
+  HULLD_ASSIGN_OR_RETURN(const std::vector<Vector> points,
+                         DecodePoints(block, std::numeric_limits<uint64_t>::max()));
+  HULLD_RETURN_IF_ERROR(CheckShape(points));
+  shapes->Add(points);
   return absl::OkStatus();
 }
 
@@ -145,7 +145,7 @@ Pose ReadPose(const v1::Pose& message) {
 
 absl::StatusOr<Pose> DecodePose(const v1::Pose& message) {
   const Pose pose = ReadPose(message);
-  if (absl::Status s = ValidatePose(pose); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(ValidatePose(pose));
   return pose;
 }
 
@@ -177,9 +177,9 @@ absl::StatusOr<Freshness> DecodeFreshness(const v1::Freshness& message, const St
   }
   if (!message.store_id().empty() && message.store_id() != store.id()) return OtherStore(store);
   if (message.has_max_staleness()) {
-    absl::StatusOr<std::chrono::nanoseconds> bound = DecodeStaleness(message.max_staleness());
-    if (!bound.ok()) return bound.status();
-    freshness.max_staleness = *bound;
+    HULLD_ASSIGN_OR_RETURN(std::chrono::nanoseconds bound,
+                           DecodeStaleness(message.max_staleness()));
+    freshness.max_staleness = bound;
   } else if (freshness.at_least_revision > 0) {
     freshness.max_staleness = std::nullopt;
   }

@@ -11,6 +11,7 @@
 #include <string>
 #include <utility>
 
+#include "core/base/status_macros.h"
 #include "server/access/caller.h"
 #include "server/contract/rpc.h"
 #include "server/process/task_pool.h"
@@ -51,15 +52,14 @@ void EndListed(Registry& registry, TaskPool& pool, UnaryCall* call, Rpc rpc, Rec
   const auto answer = [&registry, kinds, call, rpc,
                        add](std::chrono::nanoseconds staleness) -> absl::Status {
     const auto& request = call->request();
-    const absl::StatusOr<std::string> prefix =
-        PrefixToList(call->call().caller(), request.prefix());
-    if (!prefix.ok()) return prefix.status();
-    const absl::StatusOr<std::string> after = DecodePageToken(rpc, request.page_token(), *prefix);
-    if (!after.ok()) return after.status();
+    HULLD_ASSIGN_OR_RETURN(const std::string prefix,
+                           PrefixToList(call->call().caller(), request.prefix()));
+    HULLD_ASSIGN_OR_RETURN(const std::string after,
+                           DecodePageToken(rpc, request.page_token(), prefix));
     const uint32_t asked =
         request.page_size() == 0 ? Config::kDefaultPageSize : request.page_size();
     const absl::StatusOr<RecordPage> page = registry.List(
-        *prefix, *after, std::min(asked, Config::kMaxPageSize),
+        prefix, after, std::min(asked, Config::kMaxPageSize),
         [call] { return call->call().ShouldStop(); }, kinds);
     if (!page.ok()) return page.status();
     EncodeHeader(registry.store(), AsOf{page->store_revision, staleness},
@@ -67,7 +67,7 @@ void EndListed(Registry& registry, TaskPool& pool, UnaryCall* call, Rpc rpc, Rec
     for (const HullChange& entry : page->entries) add(entry, call->response());
     if (!page->more) return absl::OkStatus();
     call->response().set_next_page_token(
-        EncodePageToken(rpc, *prefix, page->entries.back().record.hull_id));
+        EncodePageToken(rpc, prefix, page->entries.back().record.hull_id));
     return absl::OkStatus();
   };
   EndFresh(registry, pool, call, answer, !registry.store().finds_records());

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/base/status_macros.h"
 #include "server/collisions/placed/scene_groups.h"
 #include "server/contract/limit_error.h"
 
@@ -94,7 +95,7 @@ absl::Status LivePairs::SelectNeighbors(std::span<const uint32_t> changed) {
       const Box box = GrownBy(boxes_[a], clearance_);
       for (uint32_t b = 0; b < boxes_.size(); ++b) {
         if (!box.Meets(boxes_[b])) continue;
-        if (absl::Status s = SelectPair(a, b); !s.ok()) return s;
+        HULLD_RETURN_IF_ERROR(SelectPair(a, b));
       }
     }
     return absl::OkStatus();
@@ -105,7 +106,7 @@ absl::Status LivePairs::SelectNeighbors(std::span<const uint32_t> changed) {
     met.clear();
     tree.AppendMeeting(GrownBy(boxes_[a], clearance_), 0, met);
     for (const uint32_t b : met) {
-      if (absl::Status s = SelectPair(a, b); !s.ok()) return s;
+      HULLD_RETURN_IF_ERROR(SelectPair(a, b));
     }
   }
   return absl::OkStatus();

@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "core/base/status_macros.h"
 #include "server/collisions/placed/query_settings.h"
 #include "server/settings/config.h"
 #include "server/wire/answer_columns.h"
@@ -113,22 +114,19 @@ absl::StatusOr<bool> PairSearch::Begin() {
       search_.emplace<MovingBodies>(table_, a_, b_, motion_);
       return false;
     }
-    if (absl::Status s = ValidateForBodies(options_); !s.ok()) return s;
+    HULLD_RETURN_IF_ERROR(ValidateForBodies(options_));
     search_.emplace<BodySearch>(table_.bodies()[a_], table_.bodies()[b_], options_);
     return false;
   }
   if (table_.has_motions()) {
-    absl::StatusOr<FirstContact> contact =
-        FindFirstContact(table_.MovingAt(a_), table_.MovingAt(b_), motion_);
-    if (!contact.ok()) return contact.status();
-    Take(*std::move(contact), {});
+    HULLD_ASSIGN_OR_RETURN(FirstContact contact,
+                           FindFirstContact(table_.MovingAt(a_), table_.MovingAt(b_), motion_));
+    Take(std::move(contact), {});
     return true;
   }
   if (options_.method == Method::kTextbookSat) {
-    absl::StatusOr<TextbookCheck> check =
-        TextbookCheck::Begin(table_.placed()[a_], table_.placed()[b_], options_);
-    if (!check.ok()) return check.status();
-    search_ = *std::move(check);
+    HULLD_ASSIGN_OR_RETURN(
+        search_, TextbookCheck::Begin(table_.placed()[a_], table_.placed()[b_], options_));
     return false;
   }
   answer_.answer = AskHulls(table_, a_, b_, options_, nullptr);
@@ -153,10 +151,9 @@ absl::StatusOr<bool> PairSearch::Continue(Clock::time_point end) {
     Take(std::move(found.contact), std::move(found.of_body));
     return true;
   }
-  absl::StatusOr<BodyAnswer> found = at_rest->Take();
-  if (!found.ok()) return found.status();
-  answer_.answer = std::move(found->answer);
-  answer_.of_body = PiecesAnswer(*std::move(found));
+  HULLD_ASSIGN_OR_RETURN(BodyAnswer found, at_rest->Take());
+  answer_.answer = std::move(found.answer);
+  answer_.of_body = PiecesAnswer(std::move(found));
   return true;
 }
 

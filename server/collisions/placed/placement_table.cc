@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "core/base/check.h"
+#include "core/base/status_macros.h"
 #include "server/contract/error_info.h"
 #include "server/contract/limit_error.h"
 #include "server/contract/status_map.h"
@@ -148,12 +149,11 @@ absl::StatusOr<PlacementTable> PlacementTable::Make(
   }
   for (const auto& [count, of] : {std::pair<int, const char*>{packed.hull_ids_size(), " hull_ids"},
                                   {packed.shape_sizes_size(), " shape_sizes"}}) {
-    if (absl::Status s = CheckCount(count, of, max_placements, what); !s.ok()) return s;
+    HULLD_RETURN_IF_ERROR(CheckCount(count, of, max_placements, what));
   }
-  if (absl::Status s = CheckPacked(packed); !s.ok()) return s;
-  const absl::StatusOr<std::vector<Vector>> shape_points = DecodeShapePoints(packed);
-  if (!shape_points.ok()) return shape_points.status();
-  return PlacementTable(packed, *shape_points, caller);
+  HULLD_RETURN_IF_ERROR(CheckPacked(packed));
+  HULLD_ASSIGN_OR_RETURN(const std::vector<Vector> shape_points, DecodeShapePoints(packed));
+  return PlacementTable(packed, shape_points, caller);
 }
 
 absl::StatusOr<PlacementTable> PlacementTable::MakePair(const v1::Placement& a,
@@ -336,10 +336,10 @@ absl::Status PlacementTable::Refresh(Registry& registry, const QueryOptions& opt
 
 absl::Status PlacementTable::ResolveFrom(Registry& registry, KnownPlaced& known,
                                          const QueryOptions& options, const ReadPlan& plan) {
-  absl::StatusOr<Resolved> resolved =
-      RefreshPlaced(registry, ids_, known, LookupFor(options, plan), options.should_stop);
-  if (!resolved.ok()) return resolved.status();
-  SetHulls(registry.store(), *std::move(resolved), options);
+  HULLD_ASSIGN_OR_RETURN(
+      Resolved resolved,
+      RefreshPlaced(registry, ids_, known, LookupFor(options, plan), options.should_stop));
+  SetHulls(registry.store(), std::move(resolved), options);
   return absl::OkStatus();
 }
 

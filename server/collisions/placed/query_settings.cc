@@ -4,6 +4,7 @@
 
 #include <utility>
 
+#include "core/base/status_macros.h"
 #include "core/query/body/body_search.h"
 #include "server/contract/error_info.h"
 #include "server/contract/limit_error.h"
@@ -29,10 +30,9 @@ constexpr OptionNames kFieldNames = {
 absl::StatusOr<QueryOptions> MakeQueryOptions(v1::Method method, const v1::Wanted& wanted,
                                               double tolerance, const Limits& limits,
                                               const CallLifetime& lifetime) {
-  const absl::StatusOr<Method> decoded = DecodeMethod(method);
-  if (!decoded.ok()) return decoded.status();
+  HULLD_ASSIGN_OR_RETURN(const Method decoded, DecodeMethod(method));
   QueryOptions options;
-  options.method = *decoded;
+  options.method = decoded;
   options.want_axis = wanted.axis();
   options.want_analysis = wanted.analysis();
   options.want_certificate = wanted.certificate();
@@ -42,7 +42,7 @@ absl::StatusOr<QueryOptions> MakeQueryOptions(v1::Method method, const v1::Wante
   if (wanted.has_max_error()) options.max_error = wanted.max_error();
   if (wanted.has_clearance()) options.clearance = wanted.clearance();
   options.tolerance = tolerance;
-  if (absl::Status s = ValidateOptions(options, kFieldNames); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(ValidateOptions(options, kFieldNames));
   if (wanted.clearance() < 0) {
     return absl::InvalidArgumentError(absl::StrCat("wanted.clearance is ", wanted.clearance(),
                                                    "; it must be a length of at least 0"));

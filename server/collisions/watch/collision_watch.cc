@@ -7,6 +7,7 @@
 #include <numeric>
 #include <utility>
 
+#include "core/base/status_macros.h"
 #include "server/collisions/placed/placed_answer.h"
 #include "server/collisions/placed/query_settings.h"
 #include "server/collisions/placed/scene_groups.h"
@@ -118,16 +119,14 @@ absl::Status CollisionWatch::HandleOpen(v1::CollisionWatchOpen& open) {
   v1::Wanted wanted;
   if (open.has_clearance()) wanted.set_clearance(open.clearance());
   const Limits& limits = parts_.registry.limits();
-  absl::StatusOr<QueryOptions> options =
-      MakeQueryOptions(v1::METHOD_UNSPECIFIED, wanted, 0, limits, call().lifetime());
-  if (!options.ok()) return options.status();
+  HULLD_ASSIGN_OR_RETURN(QueryOptions options, MakeQueryOptions(v1::METHOD_UNSPECIFIED, wanted, 0,
+                                                                limits, call().lifetime()));
   const absl::Status resting =
       RefuseMotions(open.placements(), open.packed_placements(), "a watch");
   if (!resting.ok()) return resting;
-  absl::StatusOr<PlacementTable> table =
-      PlacementTable::Make(open.placements(), *open.mutable_packed_placements(), call().caller(),
-                           limits.max_placements, "the watch");
-  if (!table.ok()) return table.status();
+  HULLD_ASSIGN_OR_RETURN(PlacementTable table,
+                         PlacementTable::Make(open.placements(), *open.mutable_packed_placements(),
+                                              call().caller(), limits.max_placements, "the watch"));
   const bool has_groups = open.groups_size() > 0 || open.ignored_group_pairs_size() > 0 ||
                           open.ignore_same_group() || open.has_movers();
   if (open.pairs_size() > 0 && has_groups) {
@@ -135,11 +134,11 @@ absl::Status CollisionWatch::HandleOpen(v1::CollisionWatchOpen& open) {
         "pairs cannot be combined with groups or movers; list the pairs, or filter all pairs");
   }
   absl::Status valid =
-      ValidatePairs(open.pairs(), table->size(), limits.max_pairs_per_batch, "the watch");
-  if (valid.ok()) valid = ValidateGroups(open, table->size());
+      ValidatePairs(open.pairs(), table.size(), limits.max_pairs_per_batch, "the watch");
+  if (valid.ok()) valid = ValidateGroups(open, table.size());
   if (!valid.ok()) return valid;
-  options_ = *std::move(options);
-  table_ = *std::move(table);
+  options_ = std::move(options);
+  table_ = std::move(table);
   table_.SortByHull();
   pairs_ = LivePairs(open, table_.size(), limits.max_pairs_per_batch);
   charge_.Set(table_.MemoryBytes() + pairs_.MemoryBytes());
@@ -171,9 +170,7 @@ absl::Status CollisionWatch::HandleOpen(v1::CollisionWatchOpen& open) {
 }
 
 absl::Status CollisionWatch::HandleUpdate(const v1::CollisionWatchUpdate& update) {
-  if (absl::Status s = ValidateMoves(update.placements(), update.poses(), table_.size()); !s.ok()) {
-    return s;
-  }
+  HULLD_RETURN_IF_ERROR(ValidateMoves(update.placements(), update.poses(), table_.size()));
   const std::vector<uint32_t> changed(update.placements().begin(), update.placements().end());
   for (size_t i = 0; i < changed.size(); ++i) {
     const uint32_t placement = changed[i];
@@ -227,9 +224,9 @@ absl::Status CollisionWatch::HandleChanges(WatchedHulls::Round round) {
 }
 
 absl::Status CollisionWatch::BeginRound(const std::vector<uint32_t>& changed) {
-  if (absl::Status s = pairs_.Select(changed, table_); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(pairs_.Select(changed, table_));
   charge_.Set(table_.MemoryBytes() + pairs_.MemoryBytes() + hulls_.MemoryBytes());
-  if (absl::Status s = parts_.registry.CheckMemory(MemoryUse::kReading); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(parts_.registry.CheckMemory(MemoryUse::kReading));
   call().AddPairs(pairs_.selected().size());
   next_hull_ = next_piece_hull_ = next_problem_ = next_pair_ = 0;
   is_sending_ = true;

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/base/check.h"
+#include "core/base/status_macros.h"
 #include "server/registry/catalog/body.h"
 
 namespace hulld::server {
@@ -52,7 +53,7 @@ absl::StatusOr<WatchedHulls::Round> WatchedHulls::Open(std::span<const std::stri
   if (!watch.ok()) return watch.status();
   watch_ = *std::move(watch);
   Round round;
-  if (absl::Status s = Resolve(std::move(all), should_stop, &round); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(Resolve(std::move(all), should_stop, &round));
   // Changes are applied here before the watch reports them. Inline shapes do not change.
   lookup_.plan = {.freshness = Freshness::AnyStaleness()};
   lookup_.shapes = nullptr;
@@ -62,16 +63,15 @@ absl::StatusOr<WatchedHulls::Round> WatchedHulls::Open(std::span<const std::stri
 
 absl::StatusOr<WatchedHulls::Round> WatchedHulls::TakeChanges(
     const std::function<bool()>& should_stop) {
-  const absl::StatusOr<WatchBatch> batch = registry_.feed().Next(watch_);
-  if (!batch.ok()) return batch.status();
+  HULLD_ASSIGN_OR_RETURN(const WatchBatch batch, registry_.feed().Next(watch_));
   Round round;
-  round.waits = batch->waits;
+  round.waits = batch.waits;
   if (round.waits) return round;
-  round.has_advanced = batch->revision > revision_;
-  round.revision = revision_ = std::max(revision_, batch->revision);
-  std::set<size_t> places = PlacesOf(*batch);
+  round.has_advanced = batch.revision > revision_;
+  round.revision = revision_ = std::max(revision_, batch.revision);
+  std::set<size_t> places = PlacesOf(batch);
   if (places.empty()) return round;
-  if (absl::Status s = Resolve(std::move(places), should_stop, &round); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(Resolve(std::move(places), should_stop, &round));
   return round;
 }
 
@@ -102,10 +102,9 @@ absl::Status WatchedHulls::Resolve(std::set<size_t> places,
     std::vector<std::string> ids;
     ids.reserve(places.size());
     for (const size_t place : places) ids.push_back(ids_[place]);
-    if (absl::Status s = WatchPieces(round->places, ids, should_stop); !s.ok()) return s;
-    absl::StatusOr<Resolved> resolved = ResolvePlaced(registry_, ids, lookup_, should_stop);
-    if (!resolved.ok()) return resolved.status();
-    round->resolved = *std::move(resolved);
+    HULLD_RETURN_IF_ERROR(WatchPieces(round->places, ids, should_stop));
+    HULLD_ASSIGN_OR_RETURN(Resolved resolved, ResolvePlaced(registry_, ids, lookup_, should_stop));
+    round->resolved = std::move(resolved);
     AddOutdatedPlaces(round->resolved, &places);
     if (places.size() == round->places.size() && HasWatchedPieces(*round)) break;
   }

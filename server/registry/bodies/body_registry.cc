@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/base/check.h"
+#include "core/base/status_macros.h"
 #include "server/contract/error_info.h"
 #include "server/registry/catalog/body.h"
 #include "server/registry/catalog/registered_hull.h"
@@ -50,7 +51,7 @@ void BodyRegistry::Put(StoredBody stored, std::optional<uint64_t> if_revision,
 absl::Status BodyRegistry::CheckPut(Locked& locked, const std::string& id,
                                     std::optional<uint64_t> if_revision) {
   // The body is already counted.
-  if (absl::Status s = state_.memory.Check(locked, MemoryUse::kWriting); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(state_.memory.Check(locked, MemoryUse::kWriting));
   if (state_.hulls.contains(id)) return IdTaken("hull", id);
   const std::shared_ptr<const Body> body = state_.FindBody(id);
   const uint64_t revision = body == nullptr ? 0 : body->record().revision;

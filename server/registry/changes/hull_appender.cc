@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/base/check.h"
+#include "core/base/status_macros.h"
 #include "server/contract/error_info.h"
 #include "server/contract/limit_error.h"
 #include "server/contract/status_map.h"
@@ -177,7 +178,7 @@ absl::StatusOr<uint64_t> HullChanges::CommittedSequence(Locked& locked, Register
   locked.Lock();
   hull.EndReadingSequence();
   if (absl::IsAborted(sequence.status())) {
-    if (absl::Status s = barrier_.AwaitPeers(locked, {}); !s.ok()) return s;
+    HULLD_RETURN_IF_ERROR(barrier_.AwaitPeers(locked, {}));
     // Every caller checks for this.
     if (hull.state.gone()) return 0;
     if (hull.supersessions() == supersessions && hull.committed().record == record) {
@@ -285,10 +286,9 @@ absl::StatusOr<HullChanges::Verdict> HullChanges::CheckChunk(Locked& locked, Reg
   if (hull.state.gone()) return GoneWhileStreaming(hull);
   const Chunk& chunk = pending.chunk;
   const std::string& writer_id = pending.session.writer_id;
-  const absl::StatusOr<uint64_t> committed = CommittedSequence(locked, hull, writer_id);
-  if (!committed.ok()) return committed.status();
+  HULLD_ASSIGN_OR_RETURN(const uint64_t committed, CommittedSequence(locked, hull, writer_id));
   if (hull.state.gone()) return GoneWhileStreaming(hull);
-  if (chunk.sequence <= *committed) return Verdict::kAlreadyApplied;
+  if (chunk.sequence <= committed) return Verdict::kAlreadyApplied;
   const uint64_t last = hull.HeadSequence(writer_id);
   if (chunk.sequence != last + 1) {
     return WithReason(absl::FailedPreconditionError(absl::StrCat(
@@ -303,9 +303,9 @@ absl::StatusOr<HullChanges::Verdict> HullChanges::CheckChunk(Locked& locked, Reg
     return TooManyWriters(hull.head(), state_.limits.max_writers_per_hull);
   }
   const HullRecord& record = hull.head().record;
-  if (absl::Status s = CheckChunkRevision(pending.session, record, chunk); !s.ok()) return s;
-  if (absl::Status s = CheckPointCount(record, chunk, state_.limits); !s.ok()) return s;
-  if (absl::Status s = state_.memory.Check(locked, MemoryUse::kWriting); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(CheckChunkRevision(pending.session, record, chunk));
+  HULLD_RETURN_IF_ERROR(CheckPointCount(record, chunk, state_.limits));
+  HULLD_RETURN_IF_ERROR(state_.memory.Check(locked, MemoryUse::kWriting));
   return Verdict::kNew;
 }
 
@@ -364,7 +364,7 @@ absl::StatusOr<std::shared_ptr<LiveHull>> HullChanges::LiveForWriter(Locked& loc
   absl::StatusOr<std::shared_ptr<LiveHull>> loaded = LoadLive(state_.store, stored);
   locked.Lock();
   if (absl::IsAborted(loaded.status())) {
-    if (absl::Status s = barrier_.AwaitPeers(locked, {}); !s.ok()) return s;
+    HULLD_RETURN_IF_ERROR(barrier_.AwaitPeers(locked, {}));
     const bool is_known = hull.state.work() == HullState::Work::kReverting || hull.state.gone() ||
                           hull.state.changing_life();
     return is_known ? Superseded() : StoreDisagrees(stored.record);
@@ -390,10 +390,10 @@ absl::StatusOr<PointCounts> HullChanges::AddPoints(PendingChunk& pending, LentBu
     builder = nullptr;
   }
   if (builder == nullptr) {
-    absl::StatusOr<std::unique_ptr<HullBuilder>> made =
-        BuildHull(change.hull.record, live.PointsAt(lent.committed), pending.should_stop);
-    if (!made.ok()) return made.status();
-    builder = *std::move(made);
+    HULLD_ASSIGN_OR_RETURN(
+        std::unique_ptr<HullBuilder> made,
+        BuildHull(change.hull.record, live.PointsAt(lent.committed), pending.should_stop));
+    builder = std::move(made);
   }
   if (Stopped(pending.should_stop)) return Cancelled();
   AddLimits limits;

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/base/check.h"
+#include "core/base/status_macros.h"
 #include "core/hull/growth/hull_builder.h"
 #include "server/contract/stopped_call.h"
 #include "server/registry/memory/hull_loader.h"
@@ -21,10 +22,9 @@ std::vector<Vector> PointsOf(const QueryHull& version) {
 
 absl::StatusOr<Hull> MakeSnapshot(const QueryHull& version, const HullRecord& record,
                                   const std::function<bool()>& should_stop) {
-  const absl::StatusOr<std::unique_ptr<HullBuilder>> builder =
-      BuildHull(record, PointsOf(version), should_stop);
-  if (!builder.ok()) return builder.status();
-  return (*builder)->Snapshot(should_stop);
+  HULLD_ASSIGN_OR_RETURN(const std::unique_ptr<HullBuilder> builder,
+                         BuildHull(record, PointsOf(version), should_stop));
+  return builder->Snapshot(should_stop);
 }
 
 }  // namespace
@@ -66,9 +66,8 @@ absl::Status CanonicalHull::Make(const QueryHull& version, const HullRecord& rec
   return MakeOnce(
       should_stop, [this] { return is_made(); },
       [&] {
-        absl::StatusOr<Hull> made = MakeSnapshot(version, record, should_stop);
-        if (!made.ok()) return made.status();
-        Keep(*std::move(made));
+        HULLD_ASSIGN_OR_RETURN(Hull made, MakeSnapshot(version, record, should_stop));
+        Keep(std::move(made));
         return absl::OkStatus();
       });
 }
@@ -78,9 +77,8 @@ absl::Status CanonicalHull::MakeQueryHull(const std::function<bool()>& should_st
   return MakeOnce(
       should_stop, [this] { return has_query_hull(); },
       [&] {
-        absl::StatusOr<QueryHull> made = QueryHull::Prepare(*hull_, should_stop);
-        if (!made.ok()) return made.status();
-        query_hull_ = std::make_unique<const QueryHull>(*std::move(made));
+        HULLD_ASSIGN_OR_RETURN(QueryHull made, QueryHull::Prepare(*hull_, should_stop));
+        query_hull_ = std::make_unique<const QueryHull>(std::move(made));
         query_hull_bytes_.store(query_hull_->MemoryBytes(), std::memory_order_release);
         Count();
         return absl::OkStatus();

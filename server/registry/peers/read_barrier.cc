@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "core/base/check.h"
+#include "core/base/status_macros.h"
 #include "server/contract/error_info.h"
 #include "server/contract/stopped_call.h"
 #include "server/process/synchronization.h"
@@ -72,7 +73,7 @@ absl::StatusOr<nanoseconds> ReadBarrier::AwaitFresh(const Freshness& freshness,
 absl::StatusOr<nanoseconds> ReadBarrier::AwaitFresh(Locked& locked, const Freshness& freshness,
                                                     const std::function<bool()>& should_stop) {
   if (const auto staleness = TryFresh(locked, freshness)) return *staleness;
-  if (absl::Status s = AwaitPeers(locked, should_stop); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(AwaitPeers(locked, should_stop));
   const uint64_t revision = state_.revision();
   if (revision >= freshness.at_least_revision) return nanoseconds(0);
   return FutureRevision(freshness.at_least_revision, revision);

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/status_macros.h"
 #include "server/contract/limit_error.h"
 #include "server/contract/stopped_call.h"
 #include "server/registry/catalog/registered_hull.h"
@@ -77,7 +78,7 @@ absl::Status HullReader::LookUpAll(Locked& locked, const HullsRead& read) {
     } else if (!known.due_.empty()) {
       if (known.due_.size() <= left_to_find) left_to_find = FindAhead(read);
       KnownHulls::Known& due = known.hulls_[known.due_.back()];
-      if (absl::Status s = LookUp(locked, read, known.due_.back()); !s.ok()) return s;
+      HULLD_RETURN_IF_ERROR(LookUp(locked, read, known.due_.back()));
       due.is_due = false;
       known.due_.pop_back();
     } else if (!known.ahead_.empty()) {
@@ -91,7 +92,7 @@ absl::Status HullReader::LookUpAll(Locked& locked, const HullsRead& read) {
     const bool stopped = Stopped(read.should_stop);
     locked.Lock();
     if (stopped) return Cancelled();
-    if (absl::Status s = CheckReaders(locked, known); !s.ok()) return s;
+    HULLD_RETURN_IF_ERROR(CheckReaders(locked, known));
   }
 }
 
@@ -140,7 +141,7 @@ absl::Status HullReader::LookUp(Locked& locked, const HullsRead& read, uint32_t 
         return absl::OkStatus();
       }
       if (!plan.may_wait) return WouldWait();
-      if (absl::Status s = CheckReaders(locked, read.known); !s.ok()) return s;
+      HULLD_RETURN_IF_ERROR(CheckReaders(locked, read.known));
       const absl::Status loaded = AwaitPoints(locked, read, k, *hull, was_missing);
       if (!loaded.ok()) return NoteFailure(loaded, known);
       continue;
@@ -149,7 +150,7 @@ absl::Status HullReader::LookUp(Locked& locked, const HullsRead& read, uint32_t 
     if (prepare && plan.prepare_first) {
       if (!plan.may_wait) return WouldWait();
       if (!std::exchange(known.is_prepared, true)) {
-        if (absl::Status s = PrepareFirst(locked, read, *hull); !s.ok()) return s;
+        HULLD_RETURN_IF_ERROR(PrepareFirst(locked, read, *hull));
         continue;
       }
     }
@@ -335,7 +336,7 @@ absl::StatusOr<Resolved> HullReader::Refresh(std::span<const std::string> ids, K
     }
     if (!staleness.ok()) return staleness.status();
     resolved.as_of.staleness = *staleness;
-    if (absl::Status s = LookUpDue(locked, {ids, known, should_stop, plan}); !s.ok()) return s;
+    HULLD_RETURN_IF_ERROR(LookUpDue(locked, {ids, known, should_stop, plan}));
     resolved.as_of.revision = state_.revision();
     if (plan.may_wait) state_.memory.Evict(locked);
   }
@@ -348,7 +349,7 @@ absl::StatusOr<const Hull*> HullReader::Canonical(const HullView& view,
   if (const Hull* made = view.served->canonical(); made != nullptr) return made;
   {
     Locked locked(state_.mutex);
-    if (absl::Status s = state_.memory.Check(locked, MemoryUse::kReading); !s.ok()) return s;
+    HULLD_RETURN_IF_ERROR(state_.memory.Check(locked, MemoryUse::kReading));
   }
   const auto start = std::chrono::steady_clock::now();
   const absl::Status status = view.served->MakeCanonical(view.record, should_stop);
@@ -394,7 +395,7 @@ absl::Status HullReader::LoadOne(Locked& locked, RegisteredHull& hull,
     locked.Lock();
     hull.EndLoading();
     if (absl::IsAborted(loaded.status())) {
-      if (absl::Status s = barrier_.AwaitPeers(locked, should_stop); !s.ok()) return s;
+      HULLD_RETURN_IF_ERROR(barrier_.AwaitPeers(locked, should_stop));
       const HullRecord& now = hull.committed().record;
       if (!hull.state.gone() && now.revision == stored.record.revision) return StoreDisagrees(now);
       continue;

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "core/base/check.h"
+#include "core/base/status_macros.h"
 #include "server/contract/stopped_call.h"
 #include "server/registry/catalog/registered_hull.h"
 
@@ -131,7 +132,7 @@ absl::Status RecordReader::AwaitKnown(Locked& locked, std::span<const std::strin
 
 absl::Status RecordReader::AwaitMissing(Locked& locked, std::span<const std::string> ids,
                                         const std::function<bool()>& should_stop) {
-  if (absl::Status s = state_.memory.Check(locked, MemoryUse::kReading); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(state_.memory.Check(locked, MemoryUse::kReading));
   std::vector<const std::string*> missing;
   for (const std::string& id : ids) {
     if (!state_.IsKnown(id)) missing.push_back(&id);
@@ -230,7 +231,7 @@ absl::StatusOr<FoundRecords> RecordReader::AwaitReached(uint64_t asked_at,
   if (found->revision < asked_at) return WentBack(found->revision, asked_at);
   Locked locked(state_.mutex);
   if (!IsBehind(*found, &locked)) return found;
-  if (absl::Status s = barrier_.AwaitCommits(locked, should_stop); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(barrier_.AwaitCommits(locked, should_stop));
   const uint64_t known = state_.revision();
   if (found->revision > known) return IsAhead(found->revision, known);
   return found;
@@ -267,13 +268,13 @@ absl::StatusOr<RecordPage> RecordReader::List(const PageRequest& request,
         request.kinds.bodies ? state_.memory.Check(locked, MemoryUse::kReading) : absl::OkStatus();
     if (!memory.ok()) return memory;
   }
-  const absl::StatusOr<FoundRecords> found = AwaitReached(
-      asked_at,
-      state_.store.ListRecords(request.prefix, request.after, request.page_size, request.kinds),
-      should_stop);
-  if (!found.ok()) return found.status();
+  HULLD_ASSIGN_OR_RETURN(const FoundRecords found,
+                         AwaitReached(asked_at,
+                                      state_.store.ListRecords(request.prefix, request.after,
+                                                               request.page_size, request.kinds),
+                                      should_stop));
   Locked locked(state_.mutex);
-  return Describe(*found, &locked);
+  return Describe(found, &locked);
 }
 
 // The registry may know more about this version than its record: its box, or its damage.

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/base/check.h"
+#include "core/base/status_macros.h"
 #include "server/contract/error_info.h"
 #include "server/registry/catalog/registered_hull.h"
 
@@ -256,7 +257,7 @@ absl::StatusOr<std::shared_ptr<Watch>> ChangeFeed::Open(const WatchTarget& targe
                                                         std::function<void()> on_ready) {
   HULLD_CHECK(!target.lists_existing || target.ids.size() <= 1);
   Locked locked(mutex_);
-  if (absl::Status s = memory_.Check(locked, MemoryUse::kReading); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(memory_.Check(locked, MemoryUse::kReading));
   const auto watch = std::make_shared<Watch>();
   if (!watches_.empty()) watch->number_ = (*watches_.rbegin())->number_ + 1;
   watch->on_ready_ = std::move(on_ready);
@@ -388,15 +389,14 @@ absl::Status ChangeFeed::AddExisting(Locked& locked, const std::shared_ptr<Watch
     Wait(*watch, batch);
     return absl::OkStatus();
   }
-  absl::StatusOr<RecordPage> page = **std::exchange(catch_up.page, nullptr);
-  if (!page.ok()) return page.status();
-  for (HullChange& change : page->entries) {
+  HULLD_ASSIGN_OR_RETURN(RecordPage page, **std::exchange(catch_up.page, nullptr));
+  for (HullChange& change : page.entries) {
     catch_up.last_id = change.record.hull_id;
     // A damaged hull or body may have no revision.
     const uint64_t after = catch_up.after_revision;
     if (after == 0 || change.record.revision > after) batch->changes.push_back(std::move(change));
   }
-  if (page->more) return absl::OkStatus();
+  if (page.more) return absl::OkStatus();
   watch->state_ = Watch::State::kBehind;
   watch->synced_at_ = revision_;
   return absl::OkStatus();
