@@ -45,7 +45,7 @@ absl::StatusOr<std::vector<std::string>> CheckConfig(const Config& config,
   if (!config.tokens_file.empty()) {
     const absl::StatusOr<TokenTable> tokens = ReadTokensFile(config.tokens_file);
     if (!tokens.ok()) return tokens.status();
-    findings.push_back(absl::StrCat(tokens->size(), " tokens"));
+    findings.push_back(absl::StrCat(tokens->size(), tokens->size() == 1 ? " token" : " tokens"));
   }
   for (const std::string& warning : ExposureWarnings(config)) {
     findings.push_back(absl::StrCat("warning: ", warning));

@@ -114,7 +114,7 @@ absl::Status Guard::ReloadTokens() {
         "are refused; add a token with 'hullctl token new'",
         config_.tokens_file);
   } else {
-    spdlog::info("{} tokens in force", tokens_.size());
+    spdlog::info("{} token{} in force", tokens_.size(), tokens_.size() == 1 ? "" : "s");
   }
   if (tokens_changed_) tokens_changed_();
   return absl::OkStatus();

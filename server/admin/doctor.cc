@@ -96,10 +96,15 @@ void PrintText(const Report& report) {
     std::printf("DAMAGED  %s\n         %s\n", finding.hull_id.c_str(), finding.what.c_str());
   }
   if (!report.failure.empty()) std::printf("FAILED   %s\n", report.failure.c_str());
-  const std::string bodies = report.bodies == 0 ? "" : absl::StrCat(", ", report.bodies, " bodies");
+  const auto counted = [](uint64_t count, const char* one, const char* many) {
+    return absl::StrCat(count, " ", count == 1 ? one : many);
+  };
+  const std::string bodies =
+      report.bodies == 0 ? "" : ", " + counted(report.bodies, "body", "bodies");
   const std::string summary =
-      absl::StrCat("store ", report.store_id, " at revision ", report.revision, ": ", report.hulls,
-                   " hulls with ", report.vertices, " vertices", bodies, ", ",
+      absl::StrCat("store ", report.store_id, " at revision ", report.revision, ": ",
+                   counted(report.hulls, "hull", "hulls"), " with ",
+                   counted(report.vertices, "vertex", "vertices"), bodies, ", ",
                    report.findings.size(), " damaged\n");
   std::fputs(summary.c_str(), stdout);
 }

@@ -93,7 +93,7 @@ TEST_F(GuardProcess, ChangedFilesAreDetectedWithoutASignal) {
   const std::string address = AddressIn(hulld.ReadLineWith("listening on "));
   EXPECT_EQ(Call(address, kToken, authority_), grpc::StatusCode::OK);
   WriteTokens(Line(kWrongToken));
-  EXPECT_NE(hulld.ReadLineWith("1 tokens in force"), "");
+  EXPECT_NE(hulld.ReadLineWith("1 token in force"), "");
   EXPECT_EQ(Call(address, kToken, authority_), grpc::StatusCode::UNAUTHENTICATED);
   EXPECT_EQ(Call(address, kWrongToken, authority_), grpc::StatusCode::OK);
   WriteIdentity(other_.Issue("renewed"));
