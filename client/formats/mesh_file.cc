@@ -22,6 +22,7 @@ absl::Status AddVertex(const ByteSource& source, std::string_view text, Triangle
   std::array<double, 3> p;
   for (double& coordinate : p) {
     const std::string_view token = NextToken(&text);
+    if (token.empty()) return source.ErrorAtLine("a vertex needs 3 coordinates");
     const NumberText kind = ParseDouble(token, &coordinate);
     if (kind != NumberText::kNumber) return source.ErrorAtLine(NumberProblem(kind, token));
     if (!std::isfinite(coordinate)) {

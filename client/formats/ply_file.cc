@@ -51,6 +51,7 @@ std::optional<ScalarType> TypeFromName(std::string_view name) {
       {"ushort", ScalarType::kUint16}, {"uint16", ScalarType::kUint16},
       {"int", ScalarType::kInt32},     {"int32", ScalarType::kInt32},
       {"uint", ScalarType::kUint32},   {"uint32", ScalarType::kUint32},
+      {"int64", ScalarType::kInt64},   {"uint64", ScalarType::kUint64},
       {"float", ScalarType::kFloat},   {"float32", ScalarType::kFloat},
       {"double", ScalarType::kDouble}, {"float64", ScalarType::kDouble},
   };

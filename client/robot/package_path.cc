@@ -99,7 +99,10 @@ absl::StatusOr<std::string> ResolveFile(const PackagePaths& paths, const std::st
     rest = name.substr(std::string(scheme).size());
     in_package = true;
   }
-  if (!in_package) {
+  // Exporters write no name for the package of the description itself.
+  const bool has_name = in_package && (rest.empty() || rest[0] != '/');
+  if (!has_name) {
+    if (in_package) rest = rest.substr(1);
     for (const std::string scheme : {"file://localhost/", "file:///", "file://", "file:"}) {
       if (name.rfind(scheme, 0) != 0) continue;
       rest = (scheme.size() > 7 ? "/" : "") + name.substr(scheme.size());

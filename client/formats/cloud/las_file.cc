@@ -4,6 +4,7 @@
 // unit in the last place of the larger summand.
 #include <absl/strings/str_cat.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstring>
@@ -38,7 +39,7 @@ Scalar Load(const std::vector<unsigned char>& bytes, size_t at) {
   return value;
 }
 
-// Reads the number of points. LAS 1.4 has a 64-bit field; the 32-bit field is then 0 or equal.
+// Reads the number of points. LAS 1.4 also has a 64-bit field; a field of 0 is not set.
 absl::Status ReadPointCount(ByteSource* source, std::vector<unsigned char>* bytes, Header* header) {
   header->point_count = Load<uint32_t>(*bytes, 107);
   if (Load<uint8_t>(*bytes, 25) < 4) return absl::OkStatus();
@@ -51,12 +52,12 @@ absl::Status ReadPointCount(ByteSource* source, std::vector<unsigned char>* byte
     return source->Truncated("within the header of LAS 1.4");
   }
   const uint64_t count = Load<uint64_t>(*bytes, 247);
-  if (header->point_count != 0 && header->point_count != count) {
+  if (header->point_count != 0 && count != 0 && header->point_count != count) {
     return source->ErrorAtByte(absl::StrCat("the header declares ", header->point_count,
                                             " points in its legacy field and ", count,
                                             " in its LAS 1.4 field; the file is damaged"));
   }
-  header->point_count = count;
+  header->point_count = std::max(header->point_count, count);
   header->has_extended_count = true;
   return absl::OkStatus();
 }

@@ -1,3 +1,4 @@
+#include <absl/strings/ascii.h>
 #include <absl/strings/str_cat.h>
 
 #include <array>
@@ -27,8 +28,7 @@ absl::Status AddSeparatedPoint(const ByteSource& source, std::string_view line,
     if (axis < 3) {
       if (const NumberText kind = points->Parse(cell, axis, &xyz[axis]);
           kind != NumberText::kNumber) {
-        return source.ErrorAtLine(NumberProblem(kind, cell) +
-                                  "; --format csv reads tables with a header");
+        return source.ErrorAtLine(NumberProblem(kind, cell));
       }
     }
     if (end == std::string_view::npos) break;
@@ -41,11 +41,25 @@ absl::Status AddSeparatedPoint(const ByteSource& source, std::string_view line,
                            [&](const std::string& message) { return source.ErrorAtLine(message); });
 }
 
+// Returns an error about the first line, with the name of the format that such files have.
+absl::Status WithAdvice(const absl::Status& error, std::string_view line) {
+  uint64_t count = 0;
+  double number = 0;
+  const char* advice = "";
+  if (ParseUnsigned(line, &count)) {
+    advice = "; --format pts reads files that start with their number of points";
+  } else if ((line[0] == '"' || absl::ascii_isalpha(static_cast<unsigned char>(line[0]))) &&
+             ParseDouble(NextToken(&line), &number) == NumberText::kNoNumber) {
+    advice = "; --format csv reads tables with a header";
+  }
+  return absl::Status(error.code(), absl::StrCat(error.message(), advice));
+}
+
 }  // namespace
 
 absl::Status ReadXyz(ByteSource* source, PointCollector* points) {
   std::string_view line;
-  while (source->ReadLine(&line)) {
+  for (bool first = true; source->ReadLine(&line);) {
     const std::string_view content = Trim(WithoutComment(line));
     // CloudCompare writes a header //X Y Z.
     if (content.empty() || content.substr(0, 2) == "//") continue;
@@ -56,7 +70,8 @@ absl::Status ReadXyz(ByteSource* source, PointCollector* points) {
     }
     absl::Status status = separated ? AddSeparatedPoint(*source, content, points)
                                     : AddTextPoint(*source, content, points);
-    if (!status.ok()) return status;
+    if (!status.ok()) return first ? WithAdvice(status, content) : status;
+    first = false;
   }
   return source->status();
 }

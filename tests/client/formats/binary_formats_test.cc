@@ -90,6 +90,20 @@ TEST(PlyFile, BinaryReadsEveryTypeAndSkipsListsAndOtherElements) {
   }
 }
 
+// trimesh writes labels as int64.
+TEST(PlyFile, BinaryReads64BitIntegers) {
+  Packer body(false);
+  body.Add(1.0f).Add(2.0f).Add(3.0f).Add(int64_t{-1}).Add(uint64_t{1} << 63);
+  const PointsRead read =
+      ReadText(PlyHead("binary_little_endian",
+                       "element vertex 1\nproperty float x\nproperty float y\nproperty float z\n"
+                       "property int64 label\nproperty uint64 id\n") +
+                   body.data(),
+               PointFormat::kPly);
+  ASSERT_TRUE(read.status.ok()) << read.status;
+  EXPECT_THAT(read.xyz(), ElementsAre(1, 2, 3));
+}
+
 TEST(PlyFile, BinaryAfterACrLfHeader) {
   // The first byte of the body is LF: it must not be parsed as a line end.
   std::string head = PlyHead("binary_little_endian", kFloatVertices);

@@ -108,6 +108,16 @@ TEST(XyzFile, NumbersMayBeSeparatedByCommasOrSemicolons) {
   }
 }
 
+TEST(XyzFile, FirstLinesOfOtherFormatsAreErrorsThatNameTheFormat) {
+  EXPECT_EQ(ReadText("x y z\n1 2 3\n", PointFormat::kXyz).error(),
+            "FILE:1: \"x\" is not a number; --format csv reads tables with a header");
+  EXPECT_EQ(ReadText("//X Y Z\n1\n1 2 3\n", PointFormat::kXyz).error(),
+            "FILE:2: a point needs 3 coordinates, got 1; --format pts reads files that start with "
+            "their number of points");
+  EXPECT_EQ(ReadText("1 2 3\n1\n", PointFormat::kXyz).error(),
+            "FILE:2: a point needs 3 coordinates, got 1");
+}
+
 TEST(XyzFile, CommasThatMayBeDecimalMarksAreErrors) {
   const auto error = [](const char* text) { return ReadText(text, PointFormat::kXyz).error(); };
   EXPECT_THAT(error("1,5 2,5 3,5\n"),
@@ -195,6 +205,43 @@ TEST(CsvFile, FindsColumnsByTheHeader) {
   EXPECT_THAT(ReadText("id,Z,\"x\",Y\n7,3,1,2\n8,\"6\",4,5\n", PointFormat::kCsv).xyz(),
               ElementsAre(1, 2, 3, 4, 5, 6));
   EXPECT_THAT(ReadText("//X,Y,Z,R\n1,2,3,9\n", PointFormat::kCsv).xyz(), ElementsAre(1, 2, 3));
+}
+
+// A mark with a space after it hid the first name, so that the row was taken for a comment and the
+// columns for x, y, and z.
+TEST(CsvFile, AHeaderMayBeAComment) {
+  for (const char* text : {"# z,y,x\n3,2,1\n", "# z y x i\n3 2 1 9\n", "#z\ty\tx\n3\t2\t1\n",
+                           "# saved today\n####\n\n// z;y;x\n3;2;1\n"}) {
+    EXPECT_THAT(ReadText(text, PointFormat::kCsv).xyz(), ElementsAre(1, 2, 3)) << text;
+  }
+}
+
+// pandas names a column that has no name after its number.
+TEST(CsvFile, AHeaderMayNameColumnsLikeNumbers) {
+  EXPECT_THAT(ReadText("x,y,z,0\n1,2,3,9\n", PointFormat::kCsv).xyz(), ElementsAre(1, 2, 3));
+}
+
+TEST(CsvFile, WhiteSpaceSeparatesCellsIfTheFirstRowHasNoOtherSeparator) {
+  EXPECT_THAT(ReadText("x y z\n1 2 3\n 4  5 6 \n", PointFormat::kCsv).xyz(),
+              ElementsAre(1, 2, 3, 4, 5, 6));
+  EXPECT_THAT(ReadText("\"z\" \"Y\" X\n3 \"2\" 1\n", PointFormat::kCsv).xyz(),
+              ElementsAre(1, 2, 3));
+  EXPECT_THAT(ReadText("1 2 3\n", PointFormat::kCsv).xyz(), ElementsAre(1, 2, 3));
+}
+
+// R's write.table names the columns of the data, but not that of the row names, so that each value
+// was read from the column before it.
+TEST(CsvFile, RowsWithMoreCellsThanTheHeaderAreErrors) {
+  for (const char* text : {"x,y,z\n7,1,2,3\n", "\"x\" \"y\" \"z\"\n\"7\" 1 2 3\n"}) {
+    EXPECT_EQ(ReadText(text, PointFormat::kCsv).error(),
+              "FILE:2: the row has 4 columns, but the header names 3; name each column")
+        << text;
+  }
+  EXPECT_THAT(ReadText("x,y,z\n1,2,3,\n", PointFormat::kCsv).xyz(), ElementsAre(1, 2, 3));
+}
+
+TEST(CsvFile, AFirstLineMayNameTheSeparator) {
+  EXPECT_THAT(ReadText("sep=;\nx;y;z\n1;2;3\n", PointFormat::kCsv).xyz(), ElementsAre(1, 2, 3));
 }
 
 TEST(CsvFile, SupportsSemicolonsTabsAndQuotes) {

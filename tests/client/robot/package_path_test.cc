@@ -64,6 +64,13 @@ TEST_F(PackagePath, FoldersAboveTheDescriptionAreSearched) {
   EXPECT_EQ(Resolve("package://tool/a.stl"), beside);
 }
 
+// Exporters write no name for the package of the description itself.
+TEST_F(PackagePath, APackageWithoutANameIsTheFolderOfTheDescription) {
+  const std::string file = Make("ws/src/arm_description/urdf/meshes/a.stl");
+  EXPECT_EQ(Resolve("package:///meshes/a.stl"), file);
+  EXPECT_THAT(Resolve("package:///b.stl"), HasSubstr("no such file"));
+}
+
 TEST_F(PackagePath, OtherNamesAreFiles) {
   const std::string file = Make("ws/src/arm_description/urdf/a.stl");
   EXPECT_EQ(Resolve("a.stl"), file);

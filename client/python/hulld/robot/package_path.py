@@ -15,7 +15,7 @@ def resolve_file(
     name: str, description: str | os.PathLike[str], packages: Mapping[str, str | os.PathLike[str]]
 ) -> pathlib.Path:
     """The file of package://PACKAGE/FILE, model://PACKAGE/FILE, file://FILE, or a path relative to
-    the description's folder. If no file has the name, its escapes such as %20 are decoded.
+    the description's folder, as in package:///FILE. If no file has the name, its escapes such as %20 are decoded.
 
     A package is the first of these folders that contains the file: the folder in `packages`,
     exclusively; DIR/PACKAGE, or DIR itself if it is named PACKAGE, for each DIR of
@@ -24,8 +24,11 @@ def resolve_file(
     one. FileNotFoundError lists these folders.
     """
     scheme, separator, rest = name.partition("://")
-    if not separator or scheme == "file":
+    # Exporters write no name for the package of the description itself.
+    unnamed = scheme in ("package", "model") and rest.startswith("/")
+    if not separator or scheme == "file" or unnamed:
         rest = name.removeprefix("file://localhost").removeprefix("file://").removeprefix("file:")
+        rest = rest.removeprefix(f"{scheme}:///") if unnamed else rest
         folder = pathlib.Path(description).parent
         if (path := _file_in(folder, rest)) is not None:
             return path

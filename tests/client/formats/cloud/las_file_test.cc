@@ -135,7 +135,23 @@ TEST(LasFile, FilesWithMissingPointsAreErrors) {
   std::string none = text;
   std::memset(none.data() + 107, 0, 4);
   EXPECT_THAT(ReadText(none, PointFormat::kLas).error(), HasSubstr("declares no points, but more"));
-  LasText two = las;
+}
+
+// A field of 0 says nothing about the number of points.
+TEST(LasFile, OneOfTheTwoCountsMayBeZero) {
+  LasText las;
+  las.minor = 4;
+  las.xyz = {100, 200, 3000, 400, 500, 6000};
+  for (const size_t field : {107, 247}) {
+    std::string text = las.Text();
+    text[field] = 0;
+    EXPECT_EQ(ReadText(text, PointFormat::kLas).counts.points, 2u) << field;
+  }
+}
+
+TEST(LasFile, CountsThatContradictEachOtherAreErrors) {
+  LasText two;
+  two.xyz = {1, 2, 3, 4, 5, 6};
   two.minor = 4;
   std::string disagreeing = two.Text();
   disagreeing[247] = 9;

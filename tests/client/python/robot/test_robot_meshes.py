@@ -178,6 +178,7 @@ def test_packages_are_searched_in_order(
     assert resolve_file(f"file://{above}", urdf, {}) == above
     assert resolve_file(f"file://localhost{above}", urdf, {}) == above
     assert resolve_file(f"file:{above}", urdf, {}) == above
+    assert resolve_file("package:///../meshes/a.stl", urdf, {}).samefile(above)
     assert resolve_file(f"file://{str(above).replace('a.stl', '%61.stl')}", urdf, {}) == above
     assert resolve_file(str(above), urdf, {}) == above
     monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path / "prefix"))
@@ -191,7 +192,7 @@ def test_packages_are_searched_in_order(
         FileNotFoundError, match=r"package 'arm' contains b.stl; .*'arm': DIR.*elsewhere"
     ):
         resolve_file("package://arm/b.stl", urdf, {"arm": tmp_path / "elsewhere"})
-    for bad in ("package://arm", "package:///a.stl", "http://a/b.stl"):
+    for bad in ("package://arm", "package://arm/", "http://a/b.stl"):
         with pytest.raises(FileNotFoundError, match="write package://PACKAGE/FILE"):
             resolve_file(bad, urdf, {})
 
