@@ -6,6 +6,7 @@
 #include <zlib.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cstring>
 #include <filesystem>
 #include <system_error>
@@ -249,7 +250,10 @@ absl::Status BackupWriter::Open() {
   }
   file_.open(partial_path_, std::ios::binary | std::ios::trunc);
   file_ << kFirstLine;
-  if (!file_) return absl::InvalidArgumentError(absl::StrCat("cannot write ", partial_path_));
+  if (!file_) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("cannot write ", partial_path_, ": ", strerror(errno)));
+  }
   opened_ = true;
   return absl::OkStatus();
 }
@@ -282,7 +286,9 @@ absl::Status BackupWriter::Finish() {
 
 absl::StatusOr<BackupCheck> RestoreBackup(const std::string& path, const std::string& directory) {
   std::ifstream file(path, std::ios::binary);
-  if (!file) return absl::InvalidArgumentError(absl::StrCat("cannot open ", path));
+  if (!file) {
+    return absl::InvalidArgumentError(absl::StrCat("cannot open ", path, ": ", strerror(errno)));
+  }
   std::string line(kFirstLineBytes, '\0');
   file.read(line.data(), static_cast<std::streamsize>(line.size()));
   if (line != kFirstLine) {

@@ -1,5 +1,6 @@
 #include "client/formats/text_number.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <limits>
@@ -177,6 +178,21 @@ std::string Printable(std::string_view text) {
     text.remove_prefix(length == 0 ? 1 : length);
   }
   return printable;
+}
+
+std::string JsonProblem(std::string_view message) {
+  constexpr std::string_view kUnknown = ": Cannot find field.";
+  const size_t unknown = message.find(kUnknown);
+  if (unknown != std::string_view::npos && unknown + kUnknown.size() == message.size()) {
+    return "there is no field " + Quoted(message.substr(0, unknown));
+  }
+  const size_t first = message.find('\n');
+  const size_t last = message.rfind('\n');
+  if (first == last) return std::string(message);
+  const std::string_view excerpt = message.substr(first + 1, last - first - 1);
+  const size_t column = std::min(message.size() - last - 2, excerpt.size());
+  return std::string(message.substr(0, message.find_last_not_of('.', first - 1) + 1)) +
+         (column < excerpt.size() ? " at " + Quoted(excerpt.substr(column)) : " at the end");
 }
 
 std::string NumberProblem(NumberText kind, std::string_view text) {

@@ -53,6 +53,10 @@ std::string PercentDecoded(std::string_view text);
 // Returns "1 facet" or "2 facets". plural: by default, the noun with an "s".
 std::string Counted(uint64_t count, const std::string& noun, const std::string& plural = "");
 
+// Returns a message of protobuf's JSON parser in one line. The parser appends an excerpt of the
+// input, and a mark below the place of the error.
+std::string JsonProblem(std::string_view message);
+
 // Returns the defect in the text of a coordinate, such as `"abc" is not a number`.
 std::string NumberProblem(NumberText kind, std::string_view text);
 

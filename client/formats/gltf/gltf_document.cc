@@ -132,8 +132,8 @@ void GltfDocument::ReadContainer() {
   while (!json.empty() && json.back() == '\0') json.pop_back();
   const auto parsed = google::protobuf::util::JsonStringToMessage(json, &root_);
   if (!parsed.ok()) {
-    const std::string problem(parsed.message().data(), parsed.message().size());
-    Fail(absl::StrCat("is not valid glTF JSON: ", problem));
+    Fail(absl::StrCat("is not valid glTF JSON: ",
+                      JsonProblem({parsed.message().data(), parsed.message().size()})));
   }
 }
 

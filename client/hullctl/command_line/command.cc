@@ -251,7 +251,9 @@ std::string CommandLine::Explain(const std::string& text) const {
     return absl::StrCat("no command given; usage: ", UsageText(command));
   }
   if (!rest.empty()) {
+    const std::string known = absl::StrJoin(CommandNames(command), ", ");
     return absl::StrCat("unexpected argument ", Quoted(rest.front()),
+                        known.empty() ? "" : "; commands: ", known,
                         "; usage: ", UsageText(command));
   }
   return text;

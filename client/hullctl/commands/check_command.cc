@@ -1,11 +1,14 @@
 #include <absl/strings/str_cat.h>
 
+#include <algorithm>
 #include <functional>
+#include <initializer_list>
 #include <memory>
 #include <optional>
 #include <string>
 #include <utility>
 
+#include "client/formats/point_file.h"
 #include "client/formats/text_number.h"
 #include "client/hullctl/command_line/arguments.h"
 #include "client/hullctl/command_line/freshness_options.h"
@@ -204,31 +207,101 @@ absl::Status SetSide(const Invocation& run, const std::string& argument, v1::Pla
   return IsShapeFile(argument) ? SetShape(run, argument, placement) : absl::OkStatus();
 }
 
+// The name of an option or argument, and true if it is given.
+using Given = std::pair<bool, const char*>;
+
+// Returns the name of the first one that is given, or null.
+const char* FirstGiven(std::initializer_list<Given> options) {
+  const auto found = std::find_if(options.begin(), options.end(),
+                                  [](const Given& option) { return option.first; });
+  return found == options.end() ? nullptr : found->second;
+}
+
 // INVALID_ARGUMENT: an option that applies only to pairs is combined with --points.
 absl::Status RefuseOptionsOfPairs(const PairArguments& arguments) {
   const v1::Wanted& wanted = arguments.details.wanted;
-  const std::pair<bool, const char*> given[] = {
-      {!arguments.b.empty(), "B"},
-      {arguments.request.b().has_pose(), "--pose-b"},
-      {arguments.to_a.has_value(), "--to-a"},
-      {arguments.to_b.has_value(), "--to-b"},
-      {arguments.request.b().radius() > 0, "--radius-b"},
-      {arguments.details.verify, "--verify"},
-      {!arguments.record.empty(), "--record"},
-      {wanted.axis(), "--axis"},
-      {wanted.analysis(), "--report"},
-      {wanted.certificate(), "--certificate"},
-      {wanted.witness(), "--witness"},
-      {wanted.normal(), "--normal"},
-      {wanted.has_clearance(), "--clearance"},
-      {arguments.details.tolerance.has_value(), "--tolerance"},
-      {arguments.details.method != v1::METHOD_UNSPECIFIED, "--textbook"}};
-  for (const auto& [is_given, name] : given) {
-    if (!is_given) continue;
-    return absl::InvalidArgumentError(absl::StrCat(
-        "--points takes --pose-a, --radius-a, --separation, and --max-error; remove ", name));
+  const char* const name =
+      FirstGiven({{!arguments.b.empty(), "B"},
+                  {arguments.request.b().has_pose(), "--pose-b"},
+                  {arguments.to_a.has_value(), "--to-a"},
+                  {arguments.to_b.has_value(), "--to-b"},
+                  {arguments.request.b().radius() > 0, "--radius-b"},
+                  {arguments.details.verify, "--verify"},
+                  {!arguments.record.empty(), "--record"},
+                  {wanted.axis(), "--axis"},
+                  {wanted.analysis(), "--report"},
+                  {wanted.certificate(), "--certificate"},
+                  {wanted.witness(), "--witness"},
+                  {wanted.normal(), "--normal"},
+                  {wanted.has_clearance(), "--clearance"},
+                  {arguments.details.tolerance.has_value(), "--tolerance"},
+                  {arguments.details.method != v1::METHOD_UNSPECIFIED, "--textbook"},
+                  {wanted.has_max_time_error(), "--max-time-error"},
+                  {wanted.has_resolution(), "--resolution"}});
+  if (name == nullptr) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrCat(
+      "--points takes --pose-a, --radius-a, --separation, and --max-error; remove ", name));
+}
+
+// INVALID_ARGUMENT: two options exclude each other. The server refuses them as well, but names the
+// fields of the contract.
+absl::Status RefuseConflicts(const PairArguments& arguments) {
+  const v1::Wanted& wanted = arguments.details.wanted;
+  const Given textbook = {arguments.details.method == v1::METHOD_TEXTBOOK_SAT, "--textbook"};
+  const Given tolerance = {arguments.details.tolerance.value_or(0) > 0, "--tolerance"};
+  const Given max_error = {wanted.has_max_error(), "--max-error"};
+  const Given separation = {wanted.separation(), "--separation"};
+  const Given witness = {wanted.witness(), "--witness"};
+  const Given normal = {wanted.normal(), "--normal"};
+  const Given clearance = {wanted.has_clearance(), "--clearance"};
+  const auto error = [](const std::string& problem) { return absl::InvalidArgumentError(problem); };
+  if (arguments.to_a.has_value() || arguments.to_b.has_value()) {
+    if (const char* const name = FirstGiven({{wanted.axis(), "--axis"},
+                                             {wanted.analysis(), "--report"},
+                                             max_error,
+                                             separation,
+                                             witness,
+                                             normal,
+                                             clearance,
+                                             tolerance,
+                                             textbook})) {
+      return error(absl::StrCat(name,
+                                " applies to a pose, and --to-a and --to-b give a motion; query "
+                                "the first contact, then query again at its pose"));
+    }
+  } else if (const char* const name = FirstGiven({{wanted.has_max_time_error(), "--max-time-error"},
+                                                  {wanted.has_resolution(), "--resolution"}})) {
+    return error(absl::StrCat(name, " applies to a motion; add --to-a or --to-b"));
+  }
+  const char* const exact = FirstGiven({textbook,
+                                        {arguments.details.verify, "--verify"},
+                                        {!arguments.record.empty(), "--record"},
+                                        {wanted.certificate(), "--certificate"},
+                                        max_error,
+                                        separation,
+                                        witness,
+                                        normal,
+                                        clearance});
+  if (tolerance.first && exact != nullptr) {
+    return error(absl::StrCat(exact, " needs the exact relation; remove it, or --tolerance"));
+  }
+  const char* const radius = FirstGiven({{arguments.request.a().radius() > 0, "--radius-a"},
+                                         {arguments.request.b().radius() > 0, "--radius-b"}});
+  if (textbook.first && radius != nullptr) {
+    return error(absl::StrCat("--textbook does not support radii; remove it, or ", radius));
   }
   return absl::OkStatus();
+}
+
+// Returns the error, and adds that a name of a file was not one, if the server does not know it.
+absl::Status WithFileHint(const absl::Status& error, const PairArguments& arguments) {
+  for (const std::string& name : {arguments.a, arguments.b}) {
+    if (!absl::IsNotFound(error) || !PointFormatOfPath(name).ok() || IsShapeFile(name)) continue;
+    const std::string missing = absl::StrCat("hull ", Quoted(name), " not found");
+    if (error.message() != missing) continue;
+    return absl::NotFoundError(absl::StrCat(missing, ", and no such file"));
+  }
+  return error;
 }
 
 ExitCode CheckPointsOfFile(const Invocation& run, const PairArguments& arguments) {
@@ -240,6 +313,7 @@ ExitCode CheckPointsOfFile(const Invocation& run, const PairArguments& arguments
 }
 
 ExitCode CheckPair(const Invocation& run, const PairArguments& arguments) {
+  if (absl::Status status = RefuseConflicts(arguments); !status.ok()) return run.FailUsage(status);
   v1::CheckCollisionRequest request = arguments.request;
   if (arguments.to_a) SetMotion(*arguments.to_a, request.mutable_a());
   if (arguments.to_b) SetMotion(*arguments.to_b, request.mutable_b());
@@ -256,11 +330,11 @@ ExitCode CheckPair(const Invocation& run, const PairArguments& arguments) {
       arguments.details.verify ? &answer.verification : nullptr;
   if (verification != nullptr) {
     auto verified = CheckCollisionVerified(client, request);
-    if (!verified.ok()) return run.Fail(verified.status());
+    if (!verified.ok()) return run.Fail(WithFileHint(verified.status(), arguments));
     answer = *std::move(verified);
   } else {
     auto response = client.CheckCollision(request);
-    if (!response.ok()) return run.Fail(response.status());
+    if (!response.ok()) return run.Fail(WithFileHint(response.status(), arguments));
     answer.response = *std::move(response);
   }
   // A record on standard output replaces the answer.

@@ -1,7 +1,10 @@
+#include <absl/strings/str_cat.h>
+
 #include <cmath>
 #include <memory>
 #include <optional>
 
+#include "client/formats/point_file.h"
 #include "client/formats/text_number.h"
 #include "client/hullctl/command_line/freshness_options.h"
 #include "client/hullctl/command_line/output_file.h"
@@ -85,6 +88,13 @@ ExitCode Mesh(const Invocation& run, const MeshArguments& arguments) {
     return run.FailUsage(absl::InvalidArgumentError(
         "--verify checks a simplification; it needs --max-vertices, --max-error, or both"));
   }
+  if (const auto format = PointFormatOfPath(arguments.file);
+      format.ok() && *format != PointFormat::kObj) {
+    return run.FailUsage(absl::InvalidArgumentError(
+        absl::StrCat(arguments.file,
+                     ": meshes are written as OBJ; choose a name that ends in "
+                     ".obj, and convert the file")));
+  }
   const auto fetched = Fetch(run, arguments);
   if (!fetched.ok()) return run.Fail(fetched.status());
   if (arguments.verify && fetched->verification.verdict != Verdict::kValid) {
@@ -114,7 +124,7 @@ void AddMeshCommand(Command program, Invocation* invocation) {
       .Completes(ValueKind::kHull);
   command.AddText("-o,--out", &arguments->file, "File to write (default: standard output)")
       .ValueName("FILE");
-  command.AddNumber("--max-vertices", 1, kAnyNumber, "Simplify to at most N vertices",
+  command.AddNumber("--max-vertices", 4, kAnyNumber, "Simplify to at most N vertices",
                     [arguments](uint64_t number) { arguments->max_vertices = number; });
   const auto take_max_error = [arguments](const std::string& text) {
     double& length = arguments->max_error;

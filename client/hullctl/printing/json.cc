@@ -3,6 +3,8 @@
 #include <google/protobuf/struct.pb.h>
 #include <google/protobuf/util/json_util.h>
 
+#include "client/formats/text_number.h"
+
 namespace hulld {
 
 std::string MessageJson(const google::protobuf::Message& message) {
@@ -20,7 +22,7 @@ absl::Status ParseJson(const std::string& json, UnknownFields unknown,
   options.ignore_unknown_fields = unknown == UnknownFields::kIgnore;
   const auto status = google::protobuf::util::JsonStringToMessage(json, message, options);
   if (status.ok()) return absl::OkStatus();
-  return absl::InvalidArgumentError(status.message().as_string());
+  return absl::InvalidArgumentError(JsonProblem(status.message().as_string()));
 }
 
 absl::Status ParseMember(const std::string& json, const std::string& name,

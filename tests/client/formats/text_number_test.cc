@@ -132,5 +132,15 @@ TEST(TextNumber, QuotesForeignTextSafely) {
   }
 }
 
+TEST(JsonProblem, IsOneLine) {
+  EXPECT_EQ(JsonProblem("Unexpected token.\na,b,c\nd\n^"), "Unexpected token at \"a,b,c?d\"");
+  EXPECT_EQ(JsonProblem("Expected : between key:value pair.\n{\"a\" 1}\n     ^"),
+            "Expected : between key:value pair at \"1}\"");
+  EXPECT_EQ(JsonProblem("Unexpected end of string. Expected a value.\n{\n ^"),
+            "Unexpected end of string. Expected a value at the end");
+  EXPECT_EQ(JsonProblem("pairs[0].x: Cannot find field."), "there is no field \"pairs[0].x\"");
+  EXPECT_EQ(JsonProblem("(a): invalid value"), "(a): invalid value");
+}
+
 }  // namespace text_number_test
 }  // namespace hulld

@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <map>
 #include <random>
 #include <sstream>
@@ -445,12 +446,45 @@ TEST_F(HullctlQuestions, StreamErrorsNameTheLineOrTheField) {
   EXPECT_THAT(ran.err, HasSubstr("contains no scene"));
 }
 
+TEST_F(HullctlQuestions, AFileThatDoesNotExistIsNotOnlyAMissingHull) {
+  Put("cube", server::Cube());
+  for (const char* name : {"part.stl", "part"}) {
+    const Ran ran = Ask({"check", name, "cube"});
+    EXPECT_EQ(ran.code, 1);
+    EXPECT_EQ(ran.err, std::string("hullctl: hull \"") + name + "\" not found" +
+                           (std::string(name) == "part" ? "" : ", and no such file") +
+                           " (see 'hullctl list')\n");
+  }
+}
+
+TEST_F(HullctlQuestions, AMeshIsNotWrittenUnderTheNameOfAnotherFormat) {
+  Put("cube", server::Cube());
+  const std::string file = testing::TempDir() + "hulld_mesh.stl";
+  const Ran ran = Ask({"mesh", "cube", "-o", file});
+  EXPECT_EQ(ran.code, 2);
+  EXPECT_THAT(ran.err, HasSubstr("meshes are written as OBJ; choose a name that ends in .obj"));
+  EXPECT_FALSE(std::filesystem::exists(file));
+}
+
 TEST_F(HullctlQuestions, ConflictingOptionsAreExplained) {
   Put("cube", server::Cube());
-  Ran ran = Ask({"check", "cube", "cube", "--tolerance", "0.1", "--separation"});
-  EXPECT_EQ(ran.code, 1);
-  EXPECT_THAT(ran.err, HasSubstr("tolerance is 0.1, but wanted.separation needs the exact"));
-  ran = Ask({"check", "cube", "cube", "--tolerance", "-1"});
+  const auto usage = [this](std::vector<std::string> options, const std::string& problem) {
+    options.insert(options.begin(), {"check", "cube", "cube"});
+    const Ran ran = Ask(options);
+    EXPECT_EQ(ran.code, 2) << ran.err;
+    EXPECT_THAT(ran.err, HasSubstr(problem));
+  };
+  usage({"--tolerance", "0.1", "--separation"},
+        "--separation needs the exact relation; remove it, or --tolerance");
+  usage({"--tolerance", "0.1", "--verify"}, "--verify needs the exact relation");
+  usage({"--to-b", "1,0,0", "--normal"}, "--normal applies to a pose, and --to-a and --to-b give");
+  usage({"--to-a", "1,0,0", "--max-error", "1"}, "--max-error applies to a pose");
+  usage({"--max-time-error", "0.1"}, "--max-time-error applies to a motion; add --to-a or --to-b");
+  usage({"--resolution", "0.1"}, "--resolution applies to a motion");
+  usage({"--textbook", "--radius-b", "1"},
+        "--textbook does not support radii; remove it, or --rad");
+  EXPECT_EQ(Ask({"check", "cube", "cube", "--tolerance", "0", "--separation"}).code, 0);
+  Ran ran = Ask({"check", "cube", "cube", "--tolerance", "-1"});
   EXPECT_EQ(ran.code, 2);
   EXPECT_THAT(ran.err, HasSubstr("--tolerance: \"-1\" is not a length of at least 0"));
   for (const char* option : {"--clearance", "--max-error"}) {

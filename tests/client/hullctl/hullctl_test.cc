@@ -142,6 +142,9 @@ TEST_F(HullctlTest, AMistypedWordGetsASuggestion) {
             "hullctl: B is required: 'hullctl check A B', or 'hullctl check A --points FILE'");
   EXPECT_EQ(error({"create", "a", "b"}),
             "hullctl: unexpected argument \"b\"; usage: hullctl create ID [OPTIONS]");
+  EXPECT_EQ(error({"scene", "chek", "a"}),
+            "hullctl: unexpected argument \"a\"; commands: apply, diff, delete, check; usage: "
+            "hullctl scene COMMAND [FILE] [OPTIONS]");
   EXPECT_EQ(error({"check", "a", "b", "--verfy"}),
             "hullctl: 'hullctl check' has no option \"--verfy\"; did you mean \"--verify\"?");
   EXPECT_EQ(error({"list", "--servr=x:1"}),
