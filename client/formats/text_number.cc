@@ -184,7 +184,11 @@ std::string JsonProblem(std::string_view message) {
   constexpr std::string_view kUnknown = ": Cannot find field.";
   const size_t unknown = message.find(kUnknown);
   if (unknown != std::string_view::npos && unknown + kUnknown.size() == message.size()) {
-    return "there is no field " + Quoted(message.substr(0, unknown));
+    const std::string_view path = message.substr(0, unknown);
+    const size_t end = path.rfind(") ");
+    const size_t name = end == std::string_view::npos ? 0 : end + 2;
+    return (name > 0 ? std::string(path.substr(1, name - 3)) : "the message") + " has no field " +
+           Quoted(path.substr(name));
   }
   const size_t first = message.find('\n');
   const size_t last = message.rfind('\n');

@@ -76,8 +76,9 @@ struct SyncArguments {
   bool yes = false;
 };
 
-// Processes a scene hull by hull, then body by body, so that an interrupted run can be continued,
-// and the hulls of a body exist before it.
+// Compares the whole scene before the first change, so that an error in the file or in a file that
+// it names changes nothing. Then processes it hull by hull, and body by body, so that an
+// interrupted run can be continued, and the hulls of a body exist before it.
 class SceneSync {
  public:
   SceneSync(const Invocation& run, const SceneDescription& scene)
@@ -87,22 +88,37 @@ class SceneSync {
   // Strangers), after a confirmation unless `yes`. Strangers that appear or change during the run
   // are kept.
   ExitCode Run(bool changes, bool prune, bool yes) {
+    std::vector<Change> hulls;
+    for (const HullDefinition& hull : scene_.hulls) {
+      const auto xyz = PointsOf(hull);
+      if (!xyz.ok()) return run_.FailUsage(xyz.status());
+      const auto change = Compare(client_, hull.hull_id, *xyz);
+      if (!change.ok()) return run_.Fail(change.status());
+      hulls.push_back(*change);
+    }
+    std::vector<Change> bodies;
+    for (const BodyDefinition& body : scene_.bodies) {
+      const auto change = CompareBody(client_, body);
+      if (!change.ok()) return run_.Fail(change.status());
+      bodies.push_back(*change);
+    }
     const auto strangers = Strangers(client_, scene_);
     if (!strangers.ok()) return run_.Fail(strangers.status());
     if (prune && changes && !yes) {
       const absl::Status confirmed = Confirm(run_, *strangers, "cancelled; nothing was changed");
       if (!confirmed.ok()) return run_.FailUsage(confirmed);
     }
-    for (const HullDefinition& hull : scene_.hulls) {
-      const auto xyz = PointsOf(hull);
-      if (!xyz.ok()) return run_.FailUsage(xyz.status());
-      const absl::Status taken =
-          Take({hull.hull_id, false, {}}, Compare(client_, hull.hull_id, *xyz), changes,
-               [&] { return PutHull(client_, hull.hull_id, *xyz); });
+    for (size_t i = 0; i < hulls.size(); ++i) {
+      const HullDefinition& hull = scene_.hulls[i];
+      const absl::Status taken = Take({hull.hull_id, false, {}}, hulls[i], changes, [&] {
+        const auto xyz = PointsOf(hull);
+        return xyz.ok() ? PutHull(client_, hull.hull_id, *xyz) : xyz.status();
+      });
       if (!taken.ok()) return run_.Fail(taken);
     }
-    for (const BodyDefinition& body : scene_.bodies) {
-      const absl::Status taken = Take({body.body_id, true, {}}, CompareBody(client_, body), changes,
+    for (size_t i = 0; i < bodies.size(); ++i) {
+      const BodyDefinition& body = scene_.bodies[i];
+      const absl::Status taken = Take({body.body_id, true, {}}, bodies[i], changes,
                                       [&] { return client_.PutBody(BodyRequest(body)).status(); });
       if (!taken.ok()) return run_.Fail(taken);
     }
@@ -120,17 +136,15 @@ class SceneSync {
 
  private:
   template <typename Put>
-  absl::Status Take(const Kept& kept, const absl::StatusOr<Change>& change, bool changes,
-                    const Put& put) {
-    if (!change.ok()) return change.status();
-    if (*change == Change::kNone) {
+  absl::Status Take(const Kept& kept, Change change, bool changes, const Put& put) {
+    if (change == Change::kNone) {
       ++(kept.is_body ? same_bodies_ : same_hulls_);
       return absl::OkStatus();
     }
     if (changes) {
       if (absl::Status done = put(); !done.ok()) return done;
     }
-    const bool is_new = *change == Change::kCreate;
+    const bool is_new = change == Change::kCreate;
     PrintChange(
         is_new ? "+" : "~", kept,
         changes ? (is_new ? "created" : "replaced") : (is_new ? "to create" : "to replace"));

@@ -156,8 +156,8 @@ absl::StatusOr<Scene> ParseScene(const std::string& text, const ObjectScanner& s
   }
   if (absl::Status fits = CheckPacked(scene.request); !fits.ok()) return fits;
   if (scene.pairs.has_value() && scene.pairs->size() % 2 != 0) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("pairs has ", scene.pairs->size(), " indices; each pair needs two"));
+    return absl::InvalidArgumentError(absl::StrCat("pairs has an odd number of indices, ",
+                                                   scene.pairs->size(), "; each pair needs two"));
   }
   for (const uint32_t index : scene.pairs.value_or(std::vector<uint32_t>())) {
     if (index < scene.size()) continue;

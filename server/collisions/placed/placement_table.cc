@@ -600,8 +600,8 @@ std::string ThereArePlacements(size_t count) {
 absl::Status ValidatePairs(const google::protobuf::RepeatedField<uint32_t>& pairs,
                            size_t placements, uint64_t max_pairs, const char* what) {
   if (pairs.size() % 2 != 0) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("pairs has ", pairs.size(), " indices; each pair needs two"));
+    return absl::InvalidArgumentError(absl::StrCat("pairs has an odd number of indices, ",
+                                                   pairs.size(), "; each pair needs two"));
   }
   const auto count = static_cast<uint64_t>(pairs.size()) / 2;
   if (count > max_pairs) {

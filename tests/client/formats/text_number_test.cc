@@ -138,7 +138,9 @@ TEST(JsonProblem, IsOneLine) {
             "Expected : between key:value pair at \"1}\"");
   EXPECT_EQ(JsonProblem("Unexpected end of string. Expected a value.\n{\n ^"),
             "Unexpected end of string. Expected a value at the end");
-  EXPECT_EQ(JsonProblem("pairs[0].x: Cannot find field."), "there is no field \"pairs[0].x\"");
+  EXPECT_EQ(JsonProblem("pair: Cannot find field."), "the message has no field \"pair\"");
+  EXPECT_EQ(JsonProblem("(placements[0]) hullID: Cannot find field."),
+            "placements[0] has no field \"hullID\"");
   EXPECT_EQ(JsonProblem("(a): invalid value"), "(a): invalid value");
 }
 

@@ -41,6 +41,16 @@ TEST_F(HullctlScene, ApplyMakesTheServerMatchTheFile) {
   EXPECT_EQ(Ask({"scene", "diff", cell_.path()}).code, 0);
 }
 
+TEST_F(HullctlScene, AnErrorInTheSceneChangesNothing) {
+  const std::string good = "prefix: part/\nhulls:\n  good: {box: [1, 1, 1]}\n";
+  for (const std::string bad : {"  bad: {file: nothing.stl}\n", "  'b d': {box: [1, 1, 1]}\n",
+                                "bodies:\n  'b d': [{hull: good}]\n"}) {
+    const TempFile scene("bad.yaml", good + bad);
+    EXPECT_NE(Ask({"scene", "apply", scene.path()}).code, 0) << bad;
+    EXPECT_EQ(Ask({"list", "part/", "--output", "name"}).out, "") << bad;
+  }
+}
+
 TEST_F(HullctlScene, ApplyRepairsDifferencesAndPrunes) {
   ASSERT_EQ(Ask({"scene", "apply", cell_.path()}).code, 0);
   const TempFile far("far.xyz", "5 5 5\n");
