@@ -25,9 +25,9 @@ absl::Status ValidateGroups(const Scene& scene, size_t placements) {
                                                    " placements; set one per placement, or none"));
   }
   if (scene.ignored_group_pairs_size() % 2 != 0) {
-    return absl::InvalidArgumentError(absl::StrCat("ignored_group_pairs has ",
-                                                   scene.ignored_group_pairs_size(),
-                                                   " groups; each pair needs two"));
+    return absl::InvalidArgumentError(
+        absl::StrCat("ignored_group_pairs has an odd number of groups, ",
+                     scene.ignored_group_pairs_size(), "; each pair needs two"));
   }
   if (scene.groups().empty() &&
       (scene.ignore_same_group() || !scene.ignored_group_pairs().empty())) {

@@ -199,7 +199,7 @@ TEST_F(FindCollisionsCall, ErrorsNameTheField) {
   ExpectRefused(request, "groups has 1 groups for 2 placements");
   request.add_groups(2);
   request.add_ignored_group_pairs(1);
-  ExpectRefused(request, "ignored_group_pairs has 1 groups; each pair needs two");
+  ExpectRefused(request, "ignored_group_pairs has an odd number of groups, 1; each pair needs two");
   request.clear_groups();
   request.add_ignored_group_pairs(1);
   ExpectRefused(request, "ignored_group_pairs requires groups");
