@@ -372,3 +372,21 @@ def test_nothing_of_all_this_reaches_a_server(connect: Callable[..., Any]) -> No
             with pytest.raises(ValueError):
                 call()
         assert fake.calls == []
+
+
+def test_max_error_requests_the_separation(either: Any, name: str) -> None:
+    either.append_points(name, CUBE, create=True)
+    scene = [name, (name, (3, 0, 0))]
+    assert either.check_collision(*scene, max_error=1e-3).separation is not None
+    assert either.check_collisions(scene, max_error=1e-3).answers.separations is not None
+    found = either.find_collisions(scene, max_error=1e-3, clearance=9)
+    assert found.answers.separations is not None
+
+
+def test_a_freshness_of_another_type_is_refused(silent: Any) -> None:
+    for call in (
+        lambda: silent.get_hull("a", freshness=0.2),
+        lambda: silent.check_collision("a", "b", freshness=0.2),
+    ):
+        with pytest.raises(TypeError, match=r"freshness is 0.2; it must be a hulld.Freshness"):
+            call()

@@ -71,6 +71,8 @@ def as_fresh(call: Call[T], freshness: Freshness | None) -> Call[T]:
 
 
 def _freshness_field(freshness: Freshness) -> bytes:
+    if not isinstance(freshness, Freshness):
+        raise TypeError(f"freshness is {freshness!r}; it must be a hulld.Freshness")
     return MessageWriter().message(FIELD, freshness.message().SerializeToString()).finish()
 
 

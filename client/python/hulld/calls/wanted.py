@@ -12,7 +12,7 @@ from hulld.v1 import collision_pb2
 
 @dataclass(frozen=True)
 class Wanted:
-    """As the keyword arguments of Client.check_collision."""
+    """As the keyword arguments of Client.check_collision. max_error requests the separation."""
 
     axis: bool = False
     analysis: bool = False
@@ -24,6 +24,9 @@ class Wanted:
     normal: bool = False
     max_time_error: float | None = None
     resolution: float | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "separation", self.separation or self.max_error is not None)
 
     def for_limit(self, limit: int | None) -> Wanted:
         """Adds the separation and the clearance that the limit of a scene requires."""
