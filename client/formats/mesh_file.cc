@@ -267,10 +267,8 @@ absl::StatusOr<TriangleMesh> ReadMesh(const std::string& path) {
       break;
     }
     default:
-      status = absl::InvalidArgumentError(
-          absl::StrCat(path,
-                       ": this format has no meshes; convert it to obj, off, stl, "
-                       "gltf or dae"));
+      status = absl::InvalidArgumentError(absl::StrCat(
+          path, ": meshes are read from obj, off, stl, gltf and dae; convert the file"));
   }
   if (!status.ok()) return status;
   return mesh;

@@ -23,8 +23,8 @@ constexpr FormatName kFormatNames[] = {
     {"xyz", PointFormat::kXyz}, {"csv", PointFormat::kCsv},   {"pcd", PointFormat::kPcd},
     {"stl", PointFormat::kStl}, {"gltf", PointFormat::kGltf}, {"glb", PointFormat::kGltf},
     {"dae", PointFormat::kDae}, {"txt", PointFormat::kXyz},   {"asc", PointFormat::kXyz},
-    {"tsv", PointFormat::kCsv}, {"pts", PointFormat::kPts},   {"las", PointFormat::kLas},
-    {"laz", PointFormat::kLas},
+    {"tsv", PointFormat::kCsv}, {"pts", PointFormat::kXyz},   {"las", PointFormat::kLas},
+    {"laz", PointFormat::kLas}, {"xyzn", PointFormat::kXyz},  {"xyzrgb", PointFormat::kXyz},
 };
 
 absl::Status ReadText(const ReadRequest& request, PointCollector* points) {
@@ -45,8 +45,6 @@ absl::Status ReadText(const ReadRequest& request, PointCollector* points) {
       return ReadCsv(source->get(), points);
     case PointFormat::kPcd:
       return ReadPcd(source->get(), points);
-    case PointFormat::kPts:
-      return ReadPts(source->get(), points);
     case PointFormat::kLas:
       return ReadLas(source->get(), points);
     case PointFormat::kStl:

@@ -12,7 +12,7 @@
 
 namespace hulld {
 
-enum class PointFormat { kObj, kOff, kPly, kXyz, kCsv, kPcd, kPts, kLas, kStl, kGltf, kDae };
+enum class PointFormat { kObj, kOff, kPly, kXyz, kCsv, kPcd, kLas, kStl, kGltf, kDae };
 
 // Returns the values of --format: "obj" and so on.
 const std::vector<std::string>& PointFormatNames();
@@ -29,7 +29,7 @@ bool IsMeshFormat(PointFormat format);
 // are returned unchanged.
 //
 // Points by format: obj: each `v` (weights and colors are ignored); off, ply, pcd, las: each
-// vertex; xyz, pts: the first three columns; csv: the columns x, y, and z; stl: each corner of each
+// vertex; xyz: the first three columns; csv: the columns x, y, and z; stl: each corner of each
 // triangle; gltf, dae: each vertex of each mesh, transformed by its node, once per node that uses
 // it. COLLADA (dae) is converted to meters using the file's unit, and keeps its axes, as robot
 // descriptions expect: up_axis is ignored. Coordinates of a mesh that no node moves are rounded
@@ -51,7 +51,6 @@ absl::Status ReadPly(ByteSource* source, PointCollector* points);
 absl::Status ReadXyz(ByteSource* source, PointCollector* points);
 absl::Status ReadCsv(ByteSource* source, PointCollector* points);
 absl::Status ReadPcd(ByteSource* source, PointCollector* points);
-absl::Status ReadPts(ByteSource* source, PointCollector* points);
 absl::Status ReadLas(ByteSource* source, PointCollector* points);
 absl::Status ReadStl(ByteSource* source, PointCollector* points);
 absl::Status ReadGltf(ByteSource* source, PointCollector* points);

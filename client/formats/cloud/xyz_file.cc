@@ -1,7 +1,10 @@
+// XYZ and PTS: one line per point, x y z and further columns. A number of points may precede each
+// scan, as Leica and CloudCompare write it.
 #include <absl/strings/ascii.h>
 #include <absl/strings/str_cat.h>
 
 #include <array>
+#include <optional>
 
 #include "client/formats/point_file.h"
 #include "client/formats/text_number.h"
@@ -41,39 +44,53 @@ absl::Status AddSeparatedPoint(const ByteSource& source, std::string_view line,
                            [&](const std::string& message) { return source.ErrorAtLine(message); });
 }
 
-// Returns an error about the first line, with the name of the format that such files have.
-absl::Status WithAdvice(const absl::Status& error, std::string_view line) {
-  uint64_t count = 0;
-  double number = 0;
-  const char* advice = "";
-  if (ParseUnsigned(line, &count)) {
-    advice = "; --format pts reads files that start with their number of points";
-  } else if ((line[0] == '"' || absl::ascii_isalpha(static_cast<unsigned char>(line[0]))) &&
-             ParseDouble(NextToken(&line), &number) == NumberText::kNoNumber) {
-    advice = "; --format csv reads tables with a header";
+// Adds the point of a line, with any of the separators.
+absl::Status AddPoint(const ByteSource& source, std::string_view line, PointCollector* points) {
+  std::string_view rest = line;
+  for (int i = 0; i < 3; ++i) {
+    if (NextToken(&rest).find_first_of(",;") == std::string_view::npos) continue;
+    return AddSeparatedPoint(source, line, points);
   }
-  return absl::Status(error.code(), absl::StrCat(error.message(), advice));
+  return AddTextPoint(source, line, points);
+}
+
+// Returns true if the line starts with a name.
+bool IsHeader(std::string_view line) {
+  double number = 0;
+  return (line[0] == '"' || absl::ascii_isalpha(static_cast<unsigned char>(line[0]))) &&
+         ParseDouble(NextToken(&line), &number) == NumberText::kNoNumber;
 }
 
 }  // namespace
 
 absl::Status ReadXyz(ByteSource* source, PointCollector* points) {
-  std::string_view line;
-  for (bool first = true; source->ReadLine(&line);) {
+  // Points of the current scan: the declared number, if any, and the number read.
+  std::optional<uint64_t> declared;
+  uint64_t found = 0;
+  bool first = true;
+  for (std::string_view line; source->ReadLine(&line);) {
     const std::string_view content = Trim(WithoutComment(line));
     // CloudCompare writes a header //X Y Z.
     if (content.empty() || content.substr(0, 2) == "//") continue;
-    std::string_view rest = content;
-    bool separated = false;
-    for (int i = 0; i < 3; ++i) {
-      separated |= NextToken(&rest).find_first_of(",;") != std::string_view::npos;
+    uint64_t count = 0;
+    const bool is_complete = declared && found == *declared;
+    if ((first || is_complete) && ParseUnsigned(content, &count)) {
+      declared = count;
+      found = 0;
+    } else if (is_complete) {
+      return source->ErrorAtLine(absl::StrCat("the scan has more lines than the ",
+                                              Counted(*declared, "point"), " it declares"));
+    } else if (absl::Status added = AddPoint(*source, content, points); !added.ok()) {
+      if (!first || !IsHeader(content)) return added;
+      return absl::InvalidArgumentError(
+          absl::StrCat(added.message(), "; --format csv reads tables with a header"));
+    } else {
+      ++found;
     }
-    absl::Status status = separated ? AddSeparatedPoint(*source, content, points)
-                                    : AddTextPoint(*source, content, points);
-    if (!status.ok()) return first ? WithAdvice(status, content) : status;
     first = false;
   }
-  return source->status();
+  if (!source->status().ok() || !declared || found == *declared) return source->status();
+  return source->Truncated(absl::StrCat("after ", found, " of ", *declared, " points"));
 }
 
 }  // namespace hulld

@@ -62,7 +62,6 @@ TEST(TextFiles, BytesThatNoTextContainsAreErrors) {
               HasSubstr("FILE:3: the line contains the byte 0 (NUL)"));
   for (const char* text : {"1 2 3\n4 5 6\x1A", "1 2 3\r\n4 5 6\r\n\x1A"}) {
     EXPECT_THAT(ReadText(text, PointFormat::kXyz).xyz(), ElementsAre(1, 2, 3, 4, 5, 6));
-    EXPECT_THAT(ReadText(text, PointFormat::kPts).xyz(), ElementsAre(1, 2, 3, 4, 5, 6));
   }
   EXPECT_THAT(ReadText("v 1 2 3\n\x1A", PointFormat::kObj).xyz(), ElementsAre(1, 2, 3));
   EXPECT_THAT(ReadText("OFF\n1 0 0\n1 2 3\n\x1A", PointFormat::kOff).xyz(), ElementsAre(1, 2, 3));
@@ -88,10 +87,8 @@ TEST(XyzFile, HeadersOfCloudCompareAreComments) {
 
 // Cut at the comment mark, the third coordinate would be 1.
 TEST(XyzFile, InfinitiesWithACommentMarkAreNotTruncated) {
-  for (const PointFormat format : {PointFormat::kXyz, PointFormat::kPts}) {
-    EXPECT_EQ(ReadText("1 2 3\n4 5 1.#INF\n", format).error(),
-              "FILE:2: point 2 has z = infinity; skip such points with --skip-nonfinite");
-  }
+  EXPECT_EQ(ReadText("1 2 3\n4 5 1.#INF\n", PointFormat::kXyz).error(),
+            "FILE:2: point 2 has z = infinity; skip such points with --skip-nonfinite");
   EXPECT_THAT(ReadText("OFF\n1 0 0\n1 2 -1.#IND\n", PointFormat::kOff).error(),
               HasSubstr("z = NaN"));
   EXPECT_THAT(ReadText("v 1 2 1.#QNAN\n", PointFormat::kObj).error(), HasSubstr("z = NaN"));
@@ -108,14 +105,11 @@ TEST(XyzFile, NumbersMayBeSeparatedByCommasOrSemicolons) {
   }
 }
 
-TEST(XyzFile, FirstLinesOfOtherFormatsAreErrorsThatNameTheFormat) {
+TEST(XyzFile, AHeaderIsAnErrorThatNamesTheFormatOfTables) {
   EXPECT_EQ(ReadText("x y z\n1 2 3\n", PointFormat::kXyz).error(),
             "FILE:1: \"x\" is not a number; --format csv reads tables with a header");
-  EXPECT_EQ(ReadText("//X Y Z\n1\n1 2 3\n", PointFormat::kXyz).error(),
-            "FILE:2: a point needs 3 coordinates, got 1; --format pts reads files that start with "
-            "their number of points");
-  EXPECT_EQ(ReadText("1 2 3\n1\n", PointFormat::kXyz).error(),
-            "FILE:2: a point needs 3 coordinates, got 1");
+  EXPECT_THAT(ReadText("1,5 2,5 3,5\n", PointFormat::kXyz).error(),
+              testing::EndsWith("a point as the decimal mark"));
 }
 
 TEST(XyzFile, CommasThatMayBeDecimalMarksAreErrors) {

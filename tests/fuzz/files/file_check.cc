@@ -67,8 +67,6 @@ PointReader ReaderOf(FileKind kind) {
       return ReadCsv;
     case FileKind::kPcd:
       return ReadPcd;
-    case FileKind::kPts:
-      return ReadPts;
     case FileKind::kLas:
       return ReadLas;
     case FileKind::kStl:
@@ -459,7 +457,7 @@ std::vector<SeedFile> SeedFiles() {
            packed},
       {FileKind::kPcd, CompressedPcd()},
       {FileKind::kXyz, "1,2,3\n4, 5, 6,7\n8;9;10\n"},
-      {FileKind::kPts, "2\n1 2 3 -9 255 0 0\n4 5 6\n1\n7 8 9\n"},
+      {FileKind::kXyz, "2\n1 2 3 -9 255 0 0\n4 5 6\n1\n7 8 9\n"},
       {FileKind::kLas, SmallLas()},
       {FileKind::kStl, SmallStl()},
       {FileKind::kStl, SmallBinaryStl()},

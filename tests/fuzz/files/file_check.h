@@ -18,7 +18,6 @@ enum class FileKind {
   kXyz,
   kCsv,
   kPcd,
-  kPts,
   kLas,
   kStl,
   kGltf,
