@@ -82,7 +82,9 @@ TEST(MeshFile, StlIsReadAsTriangles) {
 
 TEST(MeshFile, FormatsWithoutFacesAreRefusedWithAdvice) {
   const TempFile file("a.xyz", "0 0 0\n");
-  EXPECT_THAT(Error(ReadMesh(file.path())), HasSubstr("convert it to obj, off, stl, gltf or dae"));
+  EXPECT_THAT(
+      Error(ReadMesh(file.path())),
+      HasSubstr("a.xyz: meshes are read from obj, off, stl, gltf and dae; convert the file"));
 }
 
 }  // namespace mesh_file_test
