@@ -291,7 +291,8 @@ void AddAppendCommand(Command program, Invocation* invocation) {
   command.SetDetails(
       "Formats: obj, off, ply, xyz, csv, pcd, pts (text becomes the nearest double), las, stl,\n"
       "gltf, dae.\n"
-      "--create creates the hull with its first points; a rejected file leaves no hull behind.\n"
+      "--create creates the hull with its first points. Points are sent in chunks: an error\n"
+      "further on in a file leaves the chunks before it; 'hullctl replace' takes all or nothing.\n"
       "--resume needs the same files, options, and writer as before.\n"
       "--split can be repeated: a body that has all parts is not changed.\n"
       "For a closed mesh, the ratio of the volumes of hull and mesh is printed, both summed\n"
