@@ -181,6 +181,7 @@ std::string Printable(std::string_view text) {
 }
 
 std::string JsonProblem(std::string_view message) {
+  if (message.substr(0, 2) == ": ") message.remove_prefix(2);
   constexpr std::string_view kUnknown = ": Cannot find field.";
   const size_t unknown = message.find(kUnknown);
   if (unknown != std::string_view::npos && unknown + kUnknown.size() == message.size()) {

@@ -141,6 +141,7 @@ TEST(JsonProblem, IsOneLine) {
   EXPECT_EQ(JsonProblem("pair: Cannot find field."), "the message has no field \"pair\"");
   EXPECT_EQ(JsonProblem("(placements[0]) hullID: Cannot find field."),
             "placements[0] has no field \"hullID\"");
+  EXPECT_EQ(JsonProblem(": Root element must be a message."), "Root element must be a message.");
   EXPECT_EQ(JsonProblem("(a): invalid value"), "(a): invalid value");
 }
 
