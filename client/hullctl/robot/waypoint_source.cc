@@ -26,8 +26,9 @@ absl::Status SetJoint(const Robot& robot, const std::string& name, const std::st
     if (ParseDouble(text, value) == NumberText::kNumber && std::isfinite(*value)) {
       return absl::OkStatus();
     }
-    return absl::InvalidArgumentError(
-        absl::StrCat(Quoted(absl::StrCat(name, "=", text)), " is not NAME=NUMBER"));
+    return absl::InvalidArgumentError(absl::StrCat(Quoted(text), " is not a value of ",
+                                                   Quoted(name), "; give a number, as in ", name,
+                                                   "=0.5"));
   }
   const int joint = robot.FindJoint(name);
   const RobotJoint* const loose = joint >= 0 && robot.joints[static_cast<size_t>(joint)].is_loose()
