@@ -55,7 +55,7 @@ absl::Status AddPoint(const ByteSource& source, std::string_view line, PointColl
 }
 
 // Returns true if the line starts with a name.
-bool IsHeader(std::string_view line) {
+bool StartsWithName(std::string_view line) {
   double number = 0;
   return (line[0] == '"' || absl::ascii_isalpha(static_cast<unsigned char>(line[0]))) &&
          ParseDouble(NextToken(&line), &number) == NumberText::kNoNumber;
@@ -81,7 +81,7 @@ absl::Status ReadXyz(ByteSource* source, PointCollector* points) {
       return source->ErrorAtLine(absl::StrCat("the scan has more lines than the ",
                                               Counted(*declared, "point"), " it declares"));
     } else if (absl::Status added = AddPoint(*source, content, points); !added.ok()) {
-      if (!first || !IsHeader(content)) return added;
+      if (!first || !StartsWithName(content)) return added;
       return absl::InvalidArgumentError(
           absl::StrCat(added.message(), "; --format csv reads tables with a header"));
     } else {
