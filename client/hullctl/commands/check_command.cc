@@ -255,23 +255,25 @@ absl::Status RefuseConflicts(const PairArguments& arguments) {
   const Given normal = {wanted.normal(), "--normal"};
   const Given clearance = {wanted.has_clearance(), "--clearance"};
   const auto error = [](const std::string& problem) { return absl::InvalidArgumentError(problem); };
-  if (arguments.to_a.has_value() || arguments.to_b.has_value()) {
-    if (const char* const name = FirstGiven({{wanted.axis(), "--axis"},
-                                             {wanted.analysis(), "--report"},
-                                             max_error,
-                                             separation,
-                                             witness,
-                                             normal,
-                                             clearance,
-                                             tolerance,
-                                             textbook})) {
-      return error(absl::StrCat(name,
-                                " applies to a pose, and --to-a and --to-b give a motion; query "
-                                "the first contact, then query again at its pose"));
-    }
-  } else if (const char* const name = FirstGiven({{wanted.has_max_time_error(), "--max-time-error"},
-                                                  {wanted.has_resolution(), "--resolution"}})) {
-    return error(absl::StrCat(name, " applies to a motion; add --to-a or --to-b"));
+  const bool moves = arguments.to_a.has_value() || arguments.to_b.has_value();
+  const char* const measure = FirstGiven({{wanted.axis(), "--axis"},
+                                          {wanted.analysis(), "--report"},
+                                          max_error,
+                                          separation,
+                                          witness,
+                                          normal,
+                                          clearance,
+                                          tolerance,
+                                          textbook});
+  if (moves && measure != nullptr) {
+    return error(absl::StrCat(measure,
+                              " applies to a pose, and --to-a and --to-b give a motion; query the "
+                              "first contact, then query again at its pose"));
+  }
+  const char* const limit = FirstGiven({{wanted.has_max_time_error(), "--max-time-error"},
+                                        {wanted.has_resolution(), "--resolution"}});
+  if (!moves && limit != nullptr) {
+    return error(absl::StrCat(limit, " applies to a motion; add --to-a or --to-b"));
   }
   const char* const exact = FirstGiven({textbook,
                                         {arguments.details.verify, "--verify"},
