@@ -26,7 +26,7 @@ struct PackagePaths {
 std::vector<std::string> SplitPath(const std::string& path);
 
 // Resolves `name`: package://PACKAGE/FILE, model://PACKAGE/FILE, file://FILE, or a path relative to
-// the description's folder, as in package:///FILE. If no file has the name, its escapes such as %20 are decoded. A package
+// the description's folder. If no file has the name, its escapes such as %20 are decoded. A package
 // is the first existing folder of:
 //   1. the folder given for its name;
 //   2. DIR/PACKAGE, or DIR itself if named PACKAGE, for each DIR of ROS_PACKAGE_PATH, and

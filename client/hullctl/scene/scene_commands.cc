@@ -3,6 +3,7 @@
 #include <absl/strings/str_cat.h>
 
 #include <memory>
+#include <vector>
 
 #include "client/formats/text_number.h"
 #include "client/hullctl/command_line/deletion.h"

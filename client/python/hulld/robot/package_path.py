@@ -15,7 +15,8 @@ def resolve_file(
     name: str, description: str | os.PathLike[str], packages: Mapping[str, str | os.PathLike[str]]
 ) -> pathlib.Path:
     """The file of package://PACKAGE/FILE, model://PACKAGE/FILE, file://FILE, or a path relative to
-    the description's folder, as in package:///FILE. If no file has the name, its escapes such as %20 are decoded.
+    the description's folder, as in package:///FILE. If no file has the name, its escapes such as
+    %20 are decoded.
 
     A package is the first of these folders that contains the file: the folder in `packages`,
     exclusively; DIR/PACKAGE, or DIR itself if it is named PACKAGE, for each DIR of
