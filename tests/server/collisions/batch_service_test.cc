@@ -400,7 +400,8 @@ TEST_F(BatchCall, AMalformedBatchFailsAsAWhole) {
   v1::BatchCheckCollisionsRequest request;
   *request.add_placements() = PlacementOf("cube");
   request.add_pairs(0);
-  ExpectRefused(request, grpc::StatusCode::INVALID_ARGUMENT, "pairs has an odd number of indices, 1;");
+  ExpectRefused(request, grpc::StatusCode::INVALID_ARGUMENT,
+                "pairs has an odd number of indices, 1;");
   request.add_pairs(1);
   ExpectRefused(request, grpc::StatusCode::INVALID_ARGUMENT,
                 "pairs[1] is 1, but there is 1 placement");

@@ -324,7 +324,8 @@ TEST_F(StreamCollisionsCall, ErrorsNameTheMessageAndTheField) {
   ExpectRefused({v1::StreamCollisionsRequest()}, kInvalid, "set open or update");
   ExpectRefused({MoveX(0, 1)}, kInvalid, "the first message must be open");
   ExpectRefused({open, open}, kInvalid, "open was sent twice");
-  ExpectRefused({Open({PlacementOf("cube")}, {0})}, kInvalid, "open: pairs has an odd number of indices, 1;");
+  ExpectRefused({Open({PlacementOf("cube")}, {0})}, kInvalid,
+                "open: pairs has an odd number of indices, 1;");
   ExpectRefused({Open({PlacementOf("cube")}, {0, 1})}, kInvalid,
                 "open: pairs[1] is 1, but there is 1 placement");
   auto negative = open;
