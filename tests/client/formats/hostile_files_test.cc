@@ -34,9 +34,11 @@ std::vector<Sample> Samples() {
        "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\n"
        "property list uchar int l\nproperty float z\nend_header\n1 2 1 9 3\n4 5 0 6\n"},
       {PointFormat::kPly,
-       "ply\nformat binary_little_endian 1.0\nelement a 2\nproperty list uchar uchar l\n"
-       "element vertex 2\nproperty float x\nproperty float y\nproperty float z\nend_header\n" +
-           std::string("\x02zz\x00", 4) + packed},
+       std::string("ply\nformat binary_little_endian 1.0\nelement a 2\n"
+                   "property list uchar uchar l\nelement vertex 2\nproperty float x\n"
+                   "property float y\nproperty float z\nend_header\n")
+           .append("\x02zz\x00", 4)
+           .append(packed)},
       {PointFormat::kPcd,
        "VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 2\nHEIGHT 1\n"
        "POINTS 2\nDATA ascii\n1 2 3\n4 5 6\n"},
