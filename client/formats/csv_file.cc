@@ -57,6 +57,7 @@ bool IsHeader(const std::vector<std::string_view>& cells) {
 
 absl::Status FindColumns(const ByteSource& source, const std::vector<std::string_view>& header,
                          Columns* columns) {
+  Columns places = {};
   for (size_t axis = 0; axis < 3; ++axis) {
     const auto found = std::find_if(header.begin(), header.end(), [axis](std::string_view cell) {
       return cell.size() == 1 &&
@@ -67,8 +68,9 @@ absl::Status FindColumns(const ByteSource& source, const std::vector<std::string
                                              std::string(1, "xyz"[axis]),
                                              "\"; it must name x, y and z"));
     }
-    (*columns)[axis] = static_cast<size_t>(found - header.begin());
+    places[axis] = static_cast<size_t>(found - header.begin());
   }
+  *columns = places;
   return absl::OkStatus();
 }
 
@@ -124,7 +126,8 @@ absl::Status ReadCsv(ByteSource* source, PointCollector* points) {
     bool is_header = false;
     if (first) {
       status = FindColumns(*source, cells, &columns);
-      if (!status.ok() && is_comment) continue;
+      // A first line such as "# exported by ..." is a comment.
+      if (!status.ok() && content.front() == '#') continue;
       is_header = status.ok() || IsHeader(cells);
       named = is_header ? cells.size() : 0;
       first = false;

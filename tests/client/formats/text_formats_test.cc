@@ -205,7 +205,7 @@ TEST(CsvFile, FindsColumnsByTheHeader) {
 // columns for x, y, and z.
 TEST(CsvFile, AHeaderMayBeAComment) {
   for (const char* text : {"# z,y,x\n3,2,1\n", "# z y x i\n3 2 1 9\n", "#z\ty\tx\n3\t2\t1\n",
-                           "# saved today\n####\n\n// z;y;x\n3;2;1\n"}) {
+                           "# saved today\n####\n\n// z;y;x\n3;2;1\n", "# frame x\n1 2 3\n"}) {
     EXPECT_THAT(ReadText(text, PointFormat::kCsv).xyz(), ElementsAre(1, 2, 3)) << text;
   }
 }
