@@ -124,7 +124,7 @@ void AddMeshCommand(Command program, Invocation* invocation) {
       .Completes(ValueKind::kHull);
   command.AddText("-o,--out", &arguments->file, "File to write (default: standard output)")
       .ValueName("FILE");
-  command.AddNumber("--max-vertices", 4, kAnyNumber, "Simplify to at most N vertices",
+  command.AddNumber("--max-vertices", 1, kAnyNumber, "Simplify to at most N vertices",
                     [arguments](uint64_t number) { arguments->max_vertices = number; });
   const auto take_max_error = [arguments](const std::string& text) {
     double& length = arguments->max_error;

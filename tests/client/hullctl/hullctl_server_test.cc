@@ -120,8 +120,9 @@ TEST_F(HullctlQuestions, MotionsShowTheirFirstContact) {
               HasSubstr("\"firstContact\":{\"separatedUntil\":0.5,\"intervals\":[],"
                         "\"contactTime\":0.5}"));
   ran = Ask(with({"--separation"}));
-  EXPECT_EQ(ran.code, 1);
-  EXPECT_THAT(ran.err, HasSubstr("wanted.separation cannot be combined with end_pose"));
+  EXPECT_EQ(ran.code, 2);
+  EXPECT_THAT(ran.err,
+              HasSubstr("--separation applies to a pose, and --to-a and --to-b give a motion"));
 
   ran = Ask({"check", "cube", "cube", "--pose-b", "3,0,0", "--to-b", "2,0,0"});
   EXPECT_THAT(ran.out, HasSubstr("relation         SEPARATED\n"));
