@@ -32,11 +32,14 @@ for option in "$@"; do
       ;;
   esac
 done
+# Packages that the tests need after core's are installed during the build.
+sections=(build test-core)
+later_sections=()
 case $mode in
-  quick) sections=(build test-core) ;;
-  default) sections=(build test-core test models) ;;
-  ci) sections=(build test-core test models package tidy) ;;
-  *) sections=(build test-core test models "$mode") ;;
+  quick) ;;
+  default) later_sections=(test models) ;;
+  ci) later_sections=(test models package tidy) ;;
+  *) sections+=(test models "$mode") ;;
 esac
 
 failed=0
@@ -81,8 +84,9 @@ build() {
 run_tests() {
   local preset=$1 code=0
   shift
-  # Many tests wait for a disk or another process.
-  ctest --preset "$preset" --parallel $((jobs + 1)) "$@" | tee "build/$preset/ctest.log" || code=1
+  # Many tests wait for a disk or another process: with one more than there are processors, a third
+  # of the processor time was idle.
+  ctest --preset "$preset" --parallel $((2 * jobs)) "$@" | tee "build/$preset/ctest.log" || code=1
   grep -hE '^\[  SKIPPED \] [^ ]+( \(|$)' "build/$preset/Testing/Temporary/LastTest.log" | sort -u
   echo "slowest:"
   sed -n -E 's/^ *[0-9]+\/[0-9]+ Test +#[0-9]+: ([^ ]+) .* ([0-9.]+) sec.*/\2 s  \1/p' "build/$preset/ctest.log" |
@@ -129,6 +133,8 @@ by_memory=$((${available_kib:-1572864} / 1572864))
 ((jobs > by_memory)) && jobs=$((by_memory > 0 ? by_memory : 1))
 
 if [[ $install == yes ]]; then
+  # Only root can install: others learn of all missing packages at once.
+  ((EUID == 0)) || sections+=("${later_sections[@]}")
   run_part "packages" bash docker/packages.sh install "${sections[@]}" || exit 1
 fi
 if command -v ccache >/dev/null; then
@@ -149,7 +155,7 @@ readonly rare='long|mutant'
 build_preset() {  # build_preset PRESET TARGET...: tests core before it builds the rest
   local preset=$1
   shift
-  run_part "$preset: configure" cmake --preset "$preset" || return
+  run_part "$preset: configure" cmake --preset "$preset" ${configure_option-} || return
   run_part "$preset: core build" build "$preset" "${core_targets[@]}" &&
     run_part "$preset: core tests" run_tests "$preset" -L "^($core_labels)$" -LE "^($excluded)$"
   run_part "$preset: build" build "$preset" "$@"
@@ -160,6 +166,11 @@ if [[ $mode != tidy ]]; then
   run_part "format" check_format
   run_part "prose" python3 tests/prose.py
 fi
+if [[ $install == yes && ${#later_sections[@]} -gt 0 ]]; then
+  mkdir -p build
+  in_background packages bash docker/packages.sh install "${later_sections[@]}"
+fi
+finish_packages() { [[ -z ${background[packages]-} ]] || run_part "more packages" finish packages; }
 case $mode in
   quick)
     run_part "configure" cmake --preset release &&
@@ -169,14 +180,17 @@ case $mode in
   default)
     core_targets+=(print_constants proto_test)
     excluded=$rare
-    build_preset release all && run_part "release: tests" test_rest release
+    release=failed
+    build_preset release all && release=built
+    finish_packages && [[ $release == built ]] && run_part "release: tests" test_rest release
     ;;
   ci)
     excluded=none
-    build_preset asan-ubsan all && in_background asan-ubsan test_rest asan-ubsan
+    asan=failed release=failed
+    build_preset asan-ubsan all && asan=built
+    finish_packages && [[ $asan == built ]] && in_background asan-ubsan test_rest asan-ubsan
     core_targets+=(print_constants proto_test)
-    release=failed
-    lower_priority=nice build_preset release all hulld_mutants && release=built
+    lower_priority=nice configure_option=-DHULLD_BUILD_MUTANTS=ON build_preset release all && release=built
     run_part "asan-ubsan: tests" finish asan-ubsan
     if [[ $release == built ]]; then
       in_background includes check_includes

@@ -33,7 +33,7 @@ int ExploreElsewhere() {
   return status;
 }
 
-TEST(Mutant, HULLD_MUTANT) {
+TEST(Mutant, IsFound) {
   const int status = ExploreElsewhere();
   const bool is_reported = WIFEXITED(status) && WEXITSTATUS(status) == 1;
   const bool is_broken = WIFSIGNALED(status) && WTERMSIG(status) == SIGABRT;
