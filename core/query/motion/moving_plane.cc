@@ -7,8 +7,8 @@
 #include <span>
 
 #include "core/base/check.h"
-#include "core/numeric/double_double.h"
 #include "core/numeric/error_bounds.h"
+#include "core/numeric/expansion.h"
 #include "core/numeric/exponent_limits.h"
 #include "core/query/placed/placed_hull.h"
 #include "core/query/placed/plain_vector.h"
@@ -33,13 +33,20 @@ double Dot(const Quaternion& p, const Quaternion& q) {
   return (p[0] * q[0] + p[1] * q[1]) + (p[2] * q[2] + p[3] * q[3]);
 }
 
-Quaternion At(const Quaternion& q0, const Quaternion& q1, double t) {
-  Quaternion q;
-  for (int i = 0; i < 4; ++i) q[i] = Interpolated(q0[i], q1[i], t).high;
-  return q;
+// Returns (1 - t) a + t b, rounded once except for terms of 6 u^2 (|a| + |b|): the sum of four
+// doubles that represent it exactly.
+double At(double a, double b, double t) {
+  const SumWithError difference = TwoSum(b, -a);
+  const SumWithError product = TwoProduct(difference.sum, t);
+  const SumWithError sum = TwoSum(a, product.sum);
+  return sum.sum + (sum.error + (product.error + t * difference.error));
 }
 
-// Returns the symmetric bilinear form of p and q that is R(q)^T n for p = q.
+Quaternion At(const Quaternion& q0, const Quaternion& q1, double t) {
+  return {At(q0[0], q1[0], t), At(q0[1], q1[1], t), At(q0[2], q1[2], t), At(q0[3], q1[3], t)};
+}
+
+// Returns the symmetric bilinear form of p and q that is R(q)^T n for p = q (Frame::TurnedBack).
 PlainVector TurnedBack(const Quaternion& p, const Quaternion& q, const PlainVector& n) {
   const PlainVector u(p[1], p[2], p[3]);
   const PlainVector v(q[1], q[2], q[3]);
@@ -54,6 +61,15 @@ constexpr size_t kMaxScanned = 16;
 using Pair = double __attribute__((vector_size(16)));
 
 // Returns the largest n.v over the points for each direction, with the same bits as SupportValue.
+std::array<double, 1> ScanAlong(std::span<const Vector> points,
+                                const std::array<PlainVector, 1>& n) {
+  double most = -kInfinity;
+  for (const Vector& v : points) {
+    const double value = (n[0].x * v.x() + n[0].y * v.y()) + n[0].z * v.z();
+    most = value > most ? value : most;
+  }
+  return {most};
+}
 template <size_t kCount>
 std::array<double, kCount> ScanAlong(std::span<const Vector> points,
                                      const std::array<PlainVector, kCount>& n) {
@@ -160,14 +176,9 @@ class MovingPlane::Bounds {
   }
 
  private:
-  // Sets the coefficients `first` to `first + kCount - 1` of |q|^2 n.p, each to its maximum over
-  // all vertices. `turned`: the coefficients of R(q)^T n.
-  template <size_t kCount>
-  void SetMost(size_t first, std::array<PlainVector, kCount> turned);
-
   const Side& side_;
-  const Frame start_;
-  const Frame end_;
+  const Frame& start_;
+  const Frame& end_;
   const PlainVector n0_;
   const PlainVector n1_;
   const bool turns_;
@@ -194,13 +205,15 @@ MovingPlane::Side MovingPlane::SideOf(const MovingHull& moving) {
   const Pose& start = moving.X_WB.start;
   const Pose& end = moving.X_WB.end;
   const Pose& X_BH = moving.X_BH;
-  Side side{&moving.hull, std::nullopt, start.q, end.q, start.t, end.t, 0, 0, false, {}};
+  Side side{&moving.hull, std::nullopt, start.q, end.q, start.t, end.t, 0, 0, false};
   if (!IsIdentity(X_BH)) side.piece = {PlacedHull(moving.hull, X_BH).R_WH(), X_BH.t};
   int exponent = 0;
   std::frexp(std::max(LargestOf(start.q), LargestOf(end.q)), &exponent);
-  for (int i = 0; i < 4; ++i) {
-    side.q0[i] = std::ldexp(start.q[i], -exponent);
-    side.q1[i] = std::ldexp(end.q[i], -exponent);
+  if (exponent != 0) {
+    for (int i = 0; i < 4; ++i) {
+      side.q0[i] = std::ldexp(start.q[i], -exponent);
+      side.q1[i] = std::ldexp(end.q[i], -exponent);
+    }
   }
   side.size = (moving.hull.max_abs_coordinate() + X_BH.t.cwiseAbs().maxCoeff()) +
               std::max(start.t.cwiseAbs().maxCoeff(), end.t.cwiseAbs().maxCoeff());
@@ -212,22 +225,23 @@ MovingPlane::Side MovingPlane::SideOf(const MovingHull& moving) {
   return side;
 }
 
-const MovingPlane::Frame& MovingPlane::FrameAt(Side& side, double time) {
+const MovingPlane::Frame& MovingPlane::FrameAt(Side& side, double time, const Frame* kept) {
   if (side.at_rest) time = 0;
   for (const Frame& frame : side.frames) {
     if (frame.time == time) return frame;
   }
-  Frame& frame = side.frames[side.oldest];
-  side.oldest = (side.oldest + 1) % side.frames.size();
+  const auto take = [&]() -> Frame& { return side.frames[side.oldest++ % side.frames.size()]; };
+  Frame* const taken = &take();
+  Frame& frame = taken == kept ? take() : *taken;
   frame.time = time;
   frame.q = side.at_rest ? side.q0 : At(side.q0, side.q1, time);
-  frame.squared_norm = Dot(frame.q, frame.q);
+  frame.SetRotation();
   frame.usable = LargestOf(frame.q) >= kInterpolationMinRemainder;
   frame.x = side.x0;
   if (side.at_rest) return frame;
-  frame.x.x = Interpolated(side.x0.x(), side.x1.x(), time).high;
-  frame.x.y = Interpolated(side.x0.y(), side.x1.y(), time).high;
-  frame.x.z = Interpolated(side.x0.z(), side.x1.z(), time).high;
+  frame.x.x = At(side.x0.x(), side.x1.x(), time);
+  frame.x.y = At(side.x0.y(), side.x1.y(), time);
+  frame.x.z = At(side.x0.z(), side.x1.z(), time);
   return frame;
 }
 
@@ -236,16 +250,52 @@ Pose MovingPlane::PoseAt(Side& side, double time) {
   return {frame.q, frame.x};
 }
 
+// R(q)^T n errs by less than the bilinear form of q and q: its terms sum to at most sqrt(3) |q|^2
+// |n| per component instead of 6 |q|^2 |n|, with fewer roundings (kMotionPlaneErrorFactor).
+void MovingPlane::Frame::SetRotation() {
+  const auto [qw, qx, qy, qz] = q;
+  const double ww = qw * qw;
+  const double xx = qx * qx;
+  const double yy = qy * qy;
+  const double zz = qz * qz;
+  squared_norm = (ww + xx) + (yy + zz);
+  columns = {PlainVector((ww + xx) - (yy + zz), 2 * (qx * qy + qw * qz), 2 * (qx * qz - qw * qy)),
+             PlainVector(2 * (qx * qy - qw * qz), (ww + yy) - (xx + zz), 2 * (qy * qz + qw * qx)),
+             PlainVector(2 * (qx * qz + qw * qy), 2 * (qy * qz - qw * qx), (ww + zz) - (xx + yy))};
+}
+
+PlainVector MovingPlane::Frame::TurnedBack(const PlainVector& n) const {
+  return {hulld::Dot(columns[0], n), hulld::Dot(columns[1], n), hulld::Dot(columns[2], n)};
+}
+
+template <size_t kCount>
+std::array<double, kCount> MovingPlane::HullReach(const Side& side,
+                                                  std::array<PlainVector, kCount> turned) {
+  if (!side.piece) return ReachAlong(*side.hull, turned);
+  std::array<double, kCount> moved;
+  for (size_t i = 0; i < kCount; ++i) {
+    moved[i] = hulld::Dot(turned[i], PlainVector(side.piece->p_BH));
+    turned[i] = TransposedProduct(side.piece->R_BH, turned[i]);
+  }
+  std::array<double, kCount> reach = ReachAlong(*side.hull, turned);
+  for (size_t i = 0; i < kCount; ++i) reach[i] += moved[i];
+  return reach;
+}
+
+double MovingPlane::TurnedReach(Side& side, const Frame& frame, const PlainVector& n) {
+  for (const Reach& known : side.reaches) {
+    if (known.n.x == n.x && known.time == frame.time && known.n.y == n.y && known.n.z == n.z) {
+      return known.value;
+    }
+  }
+  Reach& reach = side.reaches[side.oldest_reach++ % side.reaches.size()];
+  reach = {frame.time, n, HullReach<1>(side, {frame.TurnedBack(n)})[0]};
+  return reach.value;
+}
+
 double MovingPlane::ReachAt(Side& side, const PlainVector& n, double time) {
   const Frame& frame = FrameAt(side, time);
-  PlainVector turned = TurnedBack(frame.q, frame.q, n);
-  double moved = 0;
-  if (side.piece) {
-    moved = hulld::Dot(turned, PlainVector(side.piece->p_BH));
-    turned = TransposedProduct(side.piece->R_BH, turned);
-  }
-  return (ReachAlong<1>(*side.hull, {turned})[0] + moved) / frame.squared_norm +
-         hulld::Dot(n, frame.x);
+  return TurnedReach(side, frame, n) / frame.squared_norm + hulld::Dot(n, frame.x);
 }
 
 double MovingPlane::GapAt(const Vector& n, double time) {
@@ -257,7 +307,7 @@ MovingPlane::Bounds::Bounds(Side& side, const PlainVector& n0, const PlainVector
                             double end)
     : side_(side),
       start_(FrameAt(side, start)),
-      end_(FrameAt(side, end)),
+      end_(FrameAt(side, end, &start_)),
       n0_(n0),
       n1_(n1),
       turns_(n0.x != n1.x || n0.y != n1.y || n0.z != n1.z) {
@@ -283,29 +333,12 @@ MovingPlane::Bounds::Bounds(Side& side, const PlainVector& n0, const PlainVector
   const double factor = side.piece ? kPiecePlaneErrorFactor : kMotionPlaneErrorFactor;
   const double largest = std::max(LargestComponent(n0), LargestComponent(n1));
   error_ = factor * weight_ * largest * std::max(side.size, kMotionMinSize);
-  const PlainVector first = TurnedBack(start_.q, start_.q, n0);
+  most_[0] = TurnedReach(side, start_, n0) + moved_[0];
   if (turns_ || !is_fixed) {
-    const PlainVector last = TurnedBack(end_.q, end_.q, n1);
-    SetMost<2>(0, {first, last});
-    most_[4] = most_[1];
+    most_[4] = TurnedReach(side, end_, n1) + moved_[4];
   } else {
-    SetMost<1>(0, {first});
     most_.fill(most_[0]);
   }
-}
-
-template <size_t kCount>
-void MovingPlane::Bounds::SetMost(size_t first, std::array<PlainVector, kCount> turned) {
-  std::array<double, kCount> moved;
-  for (size_t i = 0; i < kCount; ++i) {
-    // If kCount is 2, the coefficients are those at the ends.
-    moved[i] = moved_[kCount == 2 ? 4 * i : first + i];
-    if (!side_.piece) continue;
-    moved[i] += hulld::Dot(turned[i], PlainVector(side_.piece->p_BH));
-    turned[i] = TransposedProduct(side_.piece->R_BH, turned[i]);
-  }
-  const std::array<double, kCount> reach = ReachAlong(*side_.hull, turned);
-  for (size_t i = 0; i < kCount; ++i) most_[first + i] = reach[i] + moved[i];
 }
 
 void MovingPlane::Bounds::AddMiddle() {
@@ -318,15 +351,17 @@ void MovingPlane::Bounds::AddMiddle() {
   const Quaternion& q0 = start_.q;
   const Quaternion& q1 = end_.q;
   // Coefficients of R(q)^T n of degree 2 for constant n, then of degree 4.
-  const PlainVector first = TurnedBack(q0, q0, n0_);
+  const PlainVector first = start_.TurnedBack(n0_);
   const PlainVector middle = TurnedBack(q0, q1, n0_);
-  const PlainVector last = TurnedBack(q1, q1, n0_);
-  const PlainVector first_1 = turns_ ? TurnedBack(q0, q0, n1_) : first;
+  const PlainVector last = end_.TurnedBack(n0_);
+  const PlainVector first_1 = turns_ ? start_.TurnedBack(n1_) : first;
   const PlainVector middle_1 = turns_ ? TurnedBack(q0, q1, n1_) : middle;
-  const PlainVector last_1 = turns_ ? TurnedBack(q1, q1, n1_) : last;
-  SetMost<3>(1, {0.25 * (first + first_1) + 0.5 * middle,
-                 1.0 / 6 * (first_1 + 2 * (middle + middle_1) + last),
-                 0.5 * middle_1 + 0.25 * (last + last_1)});
+  const PlainVector last_1 = turns_ ? end_.TurnedBack(n1_) : last;
+  const std::array<double, 3> reach =
+      HullReach<3>(side_, {0.25 * (first + first_1) + 0.5 * middle,
+                           1.0 / 6 * (first_1 + 2 * (middle + middle_1) + last),
+                           0.5 * middle_1 + 0.25 * (last + last_1)});
+  for (int i = 0; i < 3; ++i) most_[i + 1] = reach[i] + moved_[i + 1];
 }
 
 bool MovingPlane::IsUsableAt(double time) {

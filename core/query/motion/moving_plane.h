@@ -26,7 +26,7 @@ namespace hulld {
 // time: it turns the five directions into the piece's frame, and adds a constant to each support
 // value. For a hull at rest, the polynomial is linear, and the support values at both ends suffice.
 //
-// Caches the poses at the most recently used times.
+// Caches the poses at the most recently used times, and support values at the ends of intervals.
 class MovingPlane {
  public:
   // Both hulls must outlive the result. Requires: valid motions (ValidateMotion), and neither hull
@@ -74,9 +74,22 @@ class MovingPlane {
     double time = -1;
     std::array<double, 4> q;
     PlainVector x;
+    // |q|^2, and the columns of R(q).
     double squared_norm;
+    std::array<PlainVector, 3> columns;
     // False if q is shorter than kInterpolationMinRemainder.
     bool usable;
+
+    // Computes the rotation from q.
+    void SetRotation();
+    // Returns R(q)^T n.
+    PlainVector TurnedBack(const PlainVector& n) const;
+  };
+  // The largest value of R(q(time))^T n over a hull, in the frame of its motion.
+  struct Reach {
+    double time = -1;
+    PlainVector n;
+    double value;
   };
   // The pose of a piece in its body.
   struct PieceFrame {
@@ -99,14 +112,24 @@ class MovingPlane {
     // True if the motion ends where it starts.
     bool at_rest;
     // Most recently used poses.
-    std::array<Frame, 4> frames;
+    std::array<Frame, 4> frames = {};
     uint32_t oldest = 0;
+    // Most recently computed values: a step begins with the direction at the end of the last one.
+    std::array<Reach, 8> reaches = {};
+    uint32_t oldest_reach = 0;
   };
   class Bounds;
 
   static Side SideOf(const MovingHull& moving);
-  static const Frame& FrameAt(Side& side, double time);
+  // Returns the pose at a time, valid until the next call; a frame that is `kept` stays valid, too.
+  static const Frame& FrameAt(Side& side, double time, const Frame* kept = nullptr);
   static Pose PoseAt(Side& side, double time);
+  // Returns the largest value of each direction over a hull, in the frame of its motion.
+  template <size_t kCount>
+  static std::array<double, kCount> HullReach(const Side& side,
+                                              std::array<PlainVector, kCount> turned);
+  // Returns the largest value of R(q)^T n over the hull, for q of the frame.
+  static double TurnedReach(Side& side, const Frame& frame, const PlainVector& n);
   // Returns the largest value of n.p over the hull at a frame, up to rounding.
   static double ReachAt(Side& side, const PlainVector& n, double time);
 

@@ -1,5 +1,7 @@
 #include "core/query/motion/nearest_direction.h"
 
+#include <algorithm>
+#include <cstdint>
 #include <span>
 
 #include "core/query/exact/exact_nearest.h"
@@ -28,26 +30,28 @@ absl::StatusOr<Vector> NearestDirection(const FloatPair& pair, const Vector& fir
     nearest = bounds.point;
     return bounds.direction;
   }
-  return ExactNearestUnit(pair, should_stop);
+  return ExactNearestUnit(pair, nearest, should_stop);
 }
 
-absl::StatusOr<Vector> ExactNearestUnit(const FloatPair& pair,
+absl::StatusOr<Vector> ExactNearestUnit(const FloatPair& pair, FloatCombination& nearest,
                                         const std::function<bool()>& should_stop) {
-  const absl::StatusOr<IntegerVector> n = ExactNearestDirection(pair, should_stop);
+  const absl::StatusOr<IntegerVector> n = ExactNearestDirection(pair, nearest, should_stop);
   if (!n.ok()) return n.status();
   if (IsZero(*n)) return Vector(Vector::Zero());
   return Vector((ToScaledDoubles(*n) / kScaledDoublesMax).normalized());
 }
 
 absl::StatusOr<IntegerVector> ExactNearestDirection(const FloatPair& pair,
+                                                    FloatCombination& nearest,
                                                     const std::function<bool()>& should_stop) {
   ExactPair exact(pair, should_stop);
-  absl::StatusOr<ExactNearest> nearest = FindNearestExactly(exact, {}, should_stop);
-  if (!nearest.ok()) return nearest.status();
-  IntegerVector n = {0, 0, 0};
-  for (size_t i = 0; i < nearest->point.pairs.size(); ++i) {
-    n = n - nearest->point.weights[i] * exact.Difference(nearest->point.pairs[i]);
-  }
+  const absl::StatusOr<ExactNearest> found =
+      FindNearestExactly(exact, std::span(nearest.pairs).first(nearest.count), should_stop);
+  if (!found.ok()) return found.status();
+  const IntegerVector n = -PointOf(exact, found->point);
+  // If the pair meets, the point may need a fourth pair of vertices.
+  nearest.count = static_cast<uint32_t>(std::min(found->point.pairs.size(), nearest.pairs.size()));
+  std::copy_n(found->point.pairs.begin(), nearest.count, nearest.pairs.begin());
   return n;
 }
 

@@ -22,12 +22,15 @@ absl::StatusOr<Vector> NearestDirection(const FloatPair& pair, const Vector& fir
                                         FloatCombination& nearest,
                                         const std::function<bool()>& should_stop);
 
-// Returns the same direction, exact except for the rounding to unit length. Errors: as above.
-absl::StatusOr<Vector> ExactNearestUnit(const FloatPair& pair,
+// Returns the same direction, exact except for the rounding to unit length. `nearest`, errors: as
+// above.
+absl::StatusOr<Vector> ExactNearestUnit(const FloatPair& pair, FloatCombination& nearest,
                                         const std::function<bool()>& should_stop);
 
-// Returns the same direction exactly, of any length; zero if the pair meets. Errors: as above.
+// Returns the same direction exactly, of any length; zero if the pair meets. `nearest`, errors: as
+// above.
 absl::StatusOr<IntegerVector> ExactNearestDirection(const FloatPair& pair,
+                                                    FloatCombination& nearest,
                                                     const std::function<bool()>& should_stop);
 
 }  // namespace hulld

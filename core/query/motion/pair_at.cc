@@ -41,12 +41,6 @@ PairAt::PairAt(const MovingHull& a, const MovingHull& b, double time) {
   pair_.emplace(*placed_a_, *placed_b_);
 }
 
-PairAt::PairAt(const MovingHull& a, const Pose& X_WA, const MovingHull& b, const Pose& X_WB) {
-  PlaceAt(X_WA, a, product_a_, placed_a_);
-  PlaceAt(X_WB, b, product_b_, placed_b_);
-  pair_.emplace(*placed_a_, *placed_b_);
-}
-
 absl::StatusOr<Decision> PairAt::DecideCores(const std::function<bool()>& should_stop) const {
   absl::StatusOr<Decision> decision(absl::in_place);
   const absl::Status status =
@@ -71,6 +65,18 @@ absl::StatusOr<Answer> PairAt::Check(bool want_certificate,
   options.want_certificate = want_certificate;
   options.should_stop = should_stop;
   return CheckCollision(*placed_a_, *placed_b_, options);
+}
+
+void RoundedPair::Side::MoveTo(const Pose& pose) {
+  if (placed && X_WB.q == pose.q && X_WB.t == pose.t) return;
+  X_WB = pose;
+  PlaceAt(X_WB, *moving, product, placed);
+}
+
+const FloatPair& RoundedPair::At(const Pose& X_WA, const Pose& X_WB) {
+  a_.MoveTo(X_WA);
+  b_.MoveTo(X_WB);
+  return pair_.emplace(*a_.placed, *b_.placed);
 }
 
 }  // namespace hulld

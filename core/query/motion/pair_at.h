@@ -24,8 +24,6 @@ class PairAt {
   // Both hulls must outlive the result. Requires: neither hull is empty, valid motions
   // (ValidateMotion), and a time in [0, 1].
   PairAt(const MovingHull& a, const MovingHull& b, double time);
-  // Places the hulls with their frames at the given poses.
-  PairAt(const MovingHull& a, const Pose& X_WA, const MovingHull& b, const Pose& X_WB);
   PairAt(const PairAt&) = delete;
   PairAt& operator=(const PairAt&) = delete;
 
@@ -47,6 +45,33 @@ class PairAt {
   std::optional<PoseProduct> product_b_;
   std::optional<PlacedHull> placed_a_;
   std::optional<PlacedHull> placed_b_;
+  std::optional<FloatPair> pair_;
+};
+
+// Two hulls in motion at rounded poses of their frames. Keeps a hull in place while its pose stays
+// the same.
+class RoundedPair {
+ public:
+  // Both hulls must outlive the result. Requires: neither hull is empty, and valid motions.
+  RoundedPair(const MovingHull& a, const MovingHull& b) : a_{&a}, b_{&b} {}
+  RoundedPair(const RoundedPair&) = delete;
+  RoundedPair& operator=(const RoundedPair&) = delete;
+
+  // Returns the pair with its frames at these poses, valid until the next call.
+  const FloatPair& At(const Pose& X_WA, const Pose& X_WB);
+
+ private:
+  struct Side {
+    const MovingHull* moving;
+    Pose X_WB = {};
+    std::optional<PoseProduct> product = {};
+    std::optional<PlacedHull> placed = {};
+
+    void MoveTo(const Pose& pose);
+  };
+
+  Side a_;
+  Side b_;
   std::optional<FloatPair> pair_;
 };
 

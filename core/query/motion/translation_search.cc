@@ -18,6 +18,7 @@
 #include "core/query/ladder.h"
 #include "core/query/motion/nearest_direction.h"
 #include "core/query/motion/sweep.h"
+#include "core/query/terms/separation_bounds.h"
 
 namespace hulld {
 namespace {
@@ -222,7 +223,8 @@ absl::Status TranslationSearch::Narrow() {
 absl::Status TranslationSearch::RaiseToNearest() {
   raised_ = true;
   const PairAt at(a_, b_, lower_);
-  absl::StatusOr<IntegerVector> n = ExactNearestDirection(at.pair(), options_.should_stop);
+  FloatCombination nearest;
+  absl::StatusOr<IntegerVector> n = ExactNearestDirection(at.pair(), nearest, options_.should_stop);
   if (!n.ok()) return n.status();
   return TakeSeparating(lower_, *std::move(n));
 }

@@ -57,6 +57,9 @@ constexpr double kPoorShare = 0x1p-8;
 constexpr int kMaxExactTrials = 10;
 constexpr double kShortestExactStep = 0x1p-40;
 constexpr double kShortestExactShare = 0x1p-12;
+// The search does not try tolerable planes if a contact is likely to be this many times as deep as
+// the resolution. A choice.
+constexpr double kDeepShare = 64;
 // After the search is stuck, and before it tries tolerable planes, it looks for a contact at this
 // many times, each farther away by this factor. Choices.
 constexpr int kMaxSoonTimes = 8;
@@ -102,7 +105,7 @@ double SmallestRoot(double a, double b, double c) {
 }  // namespace
 
 TurningSearch::TurningSearch(const MovingHull& a, const MovingHull& b, const MotionOptions& options)
-    : a_(a), b_(b), options_(options), poll_(options.should_stop, 1), plane_(a, b) {
+    : a_(a), b_(b), options_(options), poll_(options.should_stop, 1), plane_(a, b), rounded_(a, b) {
   const auto size_of = [](const MovingHull& moving) {
     return moving.hull.max_abs_coordinate() + (moving.radius + moving.piece_radius);
   };
@@ -145,7 +148,8 @@ absl::StatusOr<FirstContact> TurningSearch::Run() {
       if (!relation.ok()) return relation.status();
       if (*relation != Relation::kSeparated) return Contact(time, *relation);
     }
-    if (may_tolerate && step.gap <= resolution_) {
+    const bool is_deep = likely_least_gap_ < -kDeepShare * resolution_;
+    if (may_tolerate && step.gap <= resolution_ && !is_deep) {
       const absl::StatusOr<bool> stays = StaysWithinResolution();
       if (!stays.ok()) return stays.status();
       if (*stays) return WithoutContact(Relation::kWithinTolerance);
@@ -261,13 +265,14 @@ absl::StatusOr<Relation> TurningSearch::RelationAt(double time) const {
 
 absl::StatusOr<Vector> TurningSearch::DirectionAt(double time) {
   if (!plane_.IsUsableAt(time)) return Vector(Vector::Zero());
-  if (exact_) return ExactNearestUnit(PairAt(a_, b_, time).pair(), options_.should_stop);
+  if (exact_) {
+    return ExactNearestUnit(PairAt(a_, b_, time).pair(), nearest_pairs_, options_.should_stop);
+  }
   // Rounded like the plane that will use this direction.
-  const PairAt at(a_, plane_.PoseOfA(time), b_, plane_.PoseOfB(time));
-  const Vector first =
-      direction_.isZero(0) ? Vector(-Vector(at.pair().CenterDifference())) : direction_;
-  if (at.pair().usable() && first.isZero(0)) return Vector(Vector::UnitX());
-  return NearestDirection(at.pair(), first, nearest_pairs_, options_.should_stop);
+  const FloatPair& pair = rounded_.At(plane_.PoseOfA(time), plane_.PoseOfB(time));
+  const Vector first = direction_.isZero(0) ? Vector(-Vector(pair.CenterDifference())) : direction_;
+  if (pair.usable() && first.isZero(0)) return Vector(Vector::UnitX());
+  return NearestDirection(pair, first, nearest_pairs_, options_.should_stop);
 }
 
 // Tries a plane of constant direction n and, if it fails and `turns`, one that turns from n to the
@@ -311,6 +316,7 @@ double TurningSearch::LikelyContact(const Vector& n, double gap) {
   if (!plane_.IsUsableAt(soon)) return kInfinity;
   const double rate = (plane_.GapAt(n, soon) - gap) / (soon - separated_);
   const double curvature = (last_gap_ - gap + rate * last_length_) / (last_length_ * last_length_);
+  likely_least_gap_ = curvature > 0 ? gap - rate * rate / (4 * curvature) : -kInfinity;
   return separated_ + SmallestRoot(gap, rate, curvature);
 }
 
@@ -343,10 +349,13 @@ absl::StatusOr<std::optional<TurningSearch::Step>> TurningSearch::LeapTo(double 
 // is no progress.
 absl::StatusOr<std::optional<TurningSearch::Step>> TurningSearch::FindStep(const Vector& n) {
   if (n.isZero(0)) return std::nullopt;
-  const MovingPlane::Result start = plane_.Try(n, n, separated_, separated_);
-  if (!start.proven) return std::nullopt;
   // Accurate up to rounding; excludes the error bound.
-  const double gap = start.end_gap;
+  const double gap = plane_.GapAt(n, separated_);
+  MovingPlane::Result start{.gap = gap, .end_gap = gap};
+  if (!(gap > kExactShare * plane_.size())) {
+    start = plane_.Try(n, n, separated_, separated_);
+    if (!start.proven) return std::nullopt;
+  }
   if (steps_to_leap_ > 0) {
     --steps_to_leap_;
   } else {
@@ -362,7 +371,16 @@ absl::StatusOr<std::optional<TurningSearch::Step>> TurningSearch::FindStep(const
   Step step = {separated_, n, {start, n}, gap, 2};
   Plane failed = step.plane;
   double trial = std::min(1.0, separated_ + kGrowth * last_length_);
-  if (contact_ > separated_) trial = std::min(trial, contact_);
+  if (contact_ > separated_ && contact_ <= trial) {
+    trial = contact_;
+    const double gap_there = plane_.IsUsableAt(contact_) ? plane_.GapAt(n, contact_) : kInfinity;
+    if (gap_there <= 0) {
+      // No plane is proven up to this time.
+      step.failed = contact_;
+      failed.found.gap = gap_there;
+      trial = TrialBetween(separated_, start.gap, contact_, gap_there, /*turned=*/false);
+    }
+  }
   const double shortest = std::min(kShortestExactStep, kShortestExactShare * last_length_);
   for (int i = 0; i < kMaxTrials || step.until == separated_; ++i) {
     if (!(trial > step.until) || trial == step.failed) break;
@@ -409,7 +427,10 @@ absl::StatusOr<bool> TurningSearch::StaysWithinResolution() {
   const absl::StatusOr<Relation> at_end = RelationAt(1);
   if (!at_end.ok()) return at_end.status();
   if (*at_end != Relation::kSeparated) return false;
+  // Exact directions would rarely decide a search that is not thorough.
+  const bool was_exact = std::exchange(exact_, false);
   const absl::StatusOr<double> tolerable = TolerableUntil(/*thorough=*/false);
+  exact_ = was_exact;
   if (!tolerable.ok()) return tolerable.status();
   return *tolerable == 1;
 }

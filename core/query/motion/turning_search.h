@@ -11,6 +11,7 @@
 #include "core/numeric/vector.h"
 #include "core/query/motion/first_contact.h"
 #include "core/query/motion/moving_plane.h"
+#include "core/query/motion/pair_at.h"
 #include "core/query/terms/relation.h"
 #include "core/query/terms/separation_bounds.h"
 
@@ -101,6 +102,7 @@ class TurningSearch {
   const MotionOptions& options_;
   StopPoll poll_;
   MovingPlane plane_;
+  RoundedPair rounded_;
   double resolution_;
   // The pair is separated up to this time, inclusive, as intervals_ prove.
   double separated_ = 0;
@@ -122,6 +124,8 @@ class TurningSearch {
   // leap.
   double likely_contact_ = 0;
   double leap_length_ = 0;
+  // The minimum of the last parabola: the likely least gap.
+  double likely_least_gap_ = 0;
   // The vertex pairs of the most recent nearest points, in floating point.
   FloatCombination nearest_pairs_;
   // True if directions are exact except for their rounding: the hulls are too near for floating

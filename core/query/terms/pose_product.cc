@@ -121,9 +121,8 @@ LongQuaternion InterpolatedAt(const Motion& motion, double time) {
   int exponent = 0;
   std::frexp(largest, &exponent);
   LongQuaternion q;
-  for (int i = 0; i < 4; ++i) {
-    q[i] = Interpolated(std::ldexp(q0[i], -exponent), std::ldexp(q1[i], -exponent), time);
-  }
+  const auto scaled = [=](double x) { return exponent == 0 ? x : std::ldexp(x, -exponent); };
+  for (int i = 0; i < 4; ++i) q[i] = Interpolated(scaled(q0[i]), scaled(q1[i]), time);
   if (LargestOf(q) < kInterpolationMinRemainder) q = CutAt(motion, time);
   return q;
 }
