@@ -22,8 +22,8 @@ double Reach(const Box& box, const Vector& from) {
   return farthest.stableNorm() * kRoundedUp + std::numeric_limits<double>::min();
 }
 
-// A rotation about the origin of the frame preserves the distance of each point from it. A point
-// that translates moves linearly between its positions at both ends, which are in the boxes at the
+// A rotation about the origin of the frame preserves the distance of each point from it. The
+// origin, and each point of a hull that translates, moves linearly between its positions at both
 // ends. box_at: returns the bounding box at a pose.
 template <typename BoxAt>
 MovingBox Moving(const Motion& X_WB, const BoxAt& box_at) {
@@ -32,10 +32,8 @@ MovingBox Moving(const Motion& X_WB, const BoxAt& box_at) {
   if (at_start.IsEmpty()) return {at_start, at_start};
   if (IsTranslation(X_WB)) return {at_start, box_at(end)};
   const double reach = Reach(at_start, start.t);
-  const Box swept = std::isfinite(reach)
-                        ? GrownBy(MovingBox{{start.t, start.t}, {end.t, end.t}}.Around(), reach)
-                        : Box::All();
-  return {swept, swept};
+  if (!std::isfinite(reach)) return {Box::All(), Box::All()};
+  return {GrownBy({start.t, start.t}, reach), GrownBy({end.t, end.t}, reach)};
 }
 
 // An interval of times.

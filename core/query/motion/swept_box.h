@@ -8,8 +8,8 @@
 namespace hulld {
 
 // The bounding box of a placement in motion (world frame). Its bounds move linearly: at time t,
-// they are (1
-// - t) start.low + t end.low and (1 - t) start.high + t end.high.
+// they are (1 - t) start.low + t end.low and (1 - t) start.high + t end.high. The box of a turning
+// placement is a cube around the origin of its frame.
 struct MovingBox {
   Box start;
   Box end;
@@ -19,8 +19,8 @@ struct MovingBox {
 };
 
 // Returns a box that certainly contains the rounded hull at each time. For a translation, the boxes
-// of both ends (BoundingBox). A rotation may turn the hull in any direction, so its box is at rest.
-// Empty for an empty hull. Requires: a valid motion.
+// of both ends (BoundingBox). A rotation may turn the hull in any direction, so its boxes are
+// cubes. Empty for an empty hull. Requires: a valid motion.
 MovingBox MovingBoxOf(const MovingHull& moving);
 // Returns a box that certainly contains all pieces of the body at each time; see above.
 MovingBox MovingBoxOf(const MovingBody& moving);

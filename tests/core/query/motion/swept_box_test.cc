@@ -121,6 +121,32 @@ TEST(SweptBox, ObliqueRaysPassBoxesWithinTheBoxAroundThem) {
       MayMeet(ray, {{Vector(1, 1, 1), Vector(2, 9, 2)}, {Vector(1, 1, 1), Vector(2, 9, 2)}}));
 }
 
+TEST(SweptBox, TurningHullsAreCandidatesOnlyWhileTheyMayMeet) {
+  Random random(TestSeed(3));
+  int met = 0;
+  int later = 0;
+  int apart = 0;
+  for (int round = 0; round < 300; ++round) {
+    SCOPED_TRACE(round);
+    const OwnMoving a(RandomInBall(random, 5, 1), {RandomPose(random, 4), RandomPose(random, 4)});
+    const OwnMoving b(RandomInBall(random, 5, 1), {RandomPose(random, 4), RandomPose(random, 4)});
+    const MovingBox box_a = MovingBoxOf(a.moving());
+    const MovingBox box_b = MovingBoxOf(b.moving());
+    const absl::StatusOr<FirstContact> contact = FindFirstContact(a.moving(), b.moving());
+    ASSERT_TRUE(contact.ok()) << contact.status();
+    if (contact->contact_time) {
+      ++met;
+      EXPECT_TRUE(MayMeet(box_a, box_b, *contact->contact_time));
+      later += !MayMeet(box_a, box_b, contact->separated_until / 2);
+    } else {
+      apart += box_a.Around().Meets(box_b.Around()) && !MayMeet(box_a, box_b);
+    }
+  }
+  EXPECT_GT(met, 10);
+  EXPECT_GT(later, 5);
+  EXPECT_GT(apart, 20);
+}
+
 // A scene of moving points and hulls: the candidates are all pairs that meet, and few others.
 TEST(SweptBox, ScenesInMotionMissNoContact) {
   Random random(TestSeed(2));
