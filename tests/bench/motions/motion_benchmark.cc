@@ -9,16 +9,25 @@
 // and its widest `bracket`.
 //
 // Rows "static:V gap" are hulld's static query of pairs 1e-6 apart, as many as motions in a set.
+// Rows "scene:1000" are all contacts of 1000 boxes that move and turn, and with "first" the first
+// contact alone (FindCollisions with first_only); questions are pairs whose boxes may meet.
 
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
 #include <array>
+#include <cstdlib>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "core/hull/growth/hull_builder.h"
+#include "core/query/motion/first_contact.h"
+#include "core/query/motion/swept_box.h"
+#include "core/query/scene/scene.h"
+#include "tests/bench/bench_random.h"
 #include "tests/bench/csv_reporter.h"
 #include "tests/bench/motions/motion_methods.h"
 #include "tests/bench/motions/motion_sets.h"
@@ -169,6 +178,70 @@ void RegisterStatic(int vertices) {
       ->MinTime(0.01);
 }
 
+// Boxes on a lattice, apart at the start.
+class MovingScene {
+ public:
+  MovingScene() {
+    HullBuilder builder;
+    std::vector<Vector> corners;
+    for (int i = 0; i < 8; ++i)
+      corners.push_back({i & 1 ? 1.0 : -1, i & 2 ? 0.5 : -0.5, i & 4 ? 0.7 : -0.7});
+    if (!builder.Add(corners).ok()) std::abort();
+    hull_ = builder.Snapshot();
+    box_.emplace(hull_);
+    Random random(20261128);
+    for (int i = 0; i < 1000; ++i) {
+      const Pose start = {random.Rotation(), 4 * Vector(i % 10, i / 10 % 10, i / 100)};
+      const Pose end = {Turned(start.q, random.UnitVector()), start.t + 10 * random.UnitVector()};
+      moving_.push_back({*box_, {start, end}});
+      placed_.emplace_back(*box_, start);
+      swept_.push_back(MovingBoxOf(moving_.back()));
+    }
+  }
+
+  // Returns the number of candidates.
+  size_t FindContacts(bool first_only) const {
+    const SceneOptions options;
+    const SceneSearch scene = *SceneSearch::Make(placed_, options, swept_);
+    MotionOptions motion;
+    SceneCandidates candidates;
+    size_t count = 0;
+    for (uint32_t a = 0; a < scene.size(); ++a) {
+      candidates.Start(scene, a);
+      while (!candidates.Gather(1000)) {
+      }
+      while (const std::optional<uint32_t> b = candidates.Next()) {
+        ++count;
+        if (!scene.MayMeet(a, *b, motion.latest)) continue;
+        const FirstContact contact = *FindFirstContact(moving_[a], moving_[*b], motion);
+        if (first_only) motion.latest = std::min(motion.latest, contact.contact_time.value_or(1));
+      }
+    }
+    return count;
+  }
+
+ private:
+  Hull hull_;
+  std::optional<QueryHull> box_;
+  std::vector<MovingHull> moving_;
+  std::vector<PlacedHull> placed_;
+  std::vector<MovingBox> swept_;
+};
+
+void RegisterScene() {
+  for (const bool first_only : {false, true}) {
+    benchmark::RegisterBenchmark(
+        first_only ? "motions/scene:1000 first/hulld" : "motions/scene:1000/hulld",
+        [=](benchmark::State& state) {
+          static const MovingScene scene;
+          size_t candidates = 0;
+          for (auto _ : state) candidates = scene.FindContacts(first_only);
+          ReportTimePer(state, candidates);
+        })
+        ->Unit(benchmark::kMicrosecond);
+  }
+}
+
 void RegisterAll() {
   for (const int vertices : kSizes) {
     // First, because the first row names the columns.
@@ -177,6 +250,7 @@ void RegisterAll() {
     }
     RegisterStatic(vertices);
   }
+  RegisterScene();
 }
 
 }  // namespace

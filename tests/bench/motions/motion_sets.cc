@@ -10,15 +10,8 @@
 namespace hulld::bench {
 namespace {
 
-constexpr double kTurn = M_PI / 6;
 // To about 1e-7 of the sizes: below the passages, and above the resolution of answers.
 constexpr int kBisections = 23;
-
-std::array<double, 4> Turned(const std::array<double, 4>& q, const Vector& axis, double angle) {
-  const Eigen::Quaterniond turned =
-      Eigen::AngleAxisd(angle, axis) * Eigen::Quaterniond(q[0], q[1], q[2], q[3]);
-  return {turned.w(), turned.x(), turned.y(), turned.z()};
-}
 
 // Returns the motion with its path shifted.
 Motion Shifted(Motion motion, const Vector& shift) {
@@ -59,6 +52,12 @@ double ShiftFor(Passage passage, double to_miss, double reach, Random& random) {
 
 }  // namespace
 
+std::array<double, 4> Turned(const std::array<double, 4>& q, const Vector& axis) {
+  const Eigen::Quaterniond turned =
+      Eigen::AngleAxisd(M_PI / 6, axis) * Eigen::Quaterniond(q[0], q[1], q[2], q[3]);
+  return {turned.w(), turned.x(), turned.y(), turned.z()};
+}
+
 const char* Name(Passage passage) {
   switch (passage) {
     case Passage::kHit:
@@ -89,7 +88,7 @@ MotionSet MakeMotionSet(std::shared_ptr<const QuerySet> hulls, bool turns, Passa
     const Vector across = path.cross(random.UnitVector()).normalized();
     Motion X_WB;
     X_WB.start.q = random.Rotation();
-    X_WB.end.q = turns ? Turned(X_WB.start.q, random.UnitVector(), kTurn) : X_WB.start.q;
+    X_WB.end.q = turns ? Turned(X_WB.start.q, random.UnitVector()) : X_WB.start.q;
     const double nearest_time = random.Between(0.4, 0.6);
     X_WB.start.t = PlacedHull::Make(a, X_WA)->rotated_center() + X_WA.t - nearest_time * path;
     X_WB.end.t = X_WB.start.t + path;

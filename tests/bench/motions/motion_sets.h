@@ -1,6 +1,7 @@
 #ifndef HULLD_TESTS_BENCH_MOTIONS_MOTION_SETS_H_
 #define HULLD_TESTS_BENCH_MOTIONS_MOTION_SETS_H_
 
+#include <array>
 #include <cstddef>
 #include <memory>
 #include <vector>
@@ -43,6 +44,9 @@ struct MotionSet {
     return hulls->query_hulls[question.hull_b];
   }
 };
+
+// Returns a rotation turned by 30 degrees about an axis.
+std::array<double, 4> Turned(const std::array<double, 4>& q, const Vector& axis);
 
 // Returns motions of the hulls in `hulls` across four times the sum of the radii: translations, or
 // also rotations by 30 degrees about random axes. Fixed seeds.
