@@ -24,7 +24,7 @@ constexpr double kLeftShare = 0x1p-5;
 constexpr int kMaxTrials = 10;
 // A plane that turns replaces a constant one if, at the end of the latter, this share of its gap is
 // left along the nearest direction. A choice.
-constexpr double kTurnedShare = 0.25;
+constexpr double kTurnedShare = 0.5;
 // A plane turns by less than 60 degrees, so that its normal, linear in time, keeps more than 0.86
 // of its length. A choice.
 constexpr double kMinCosine = 0.5;
