@@ -28,8 +28,8 @@ class SmallPair {
  public:
   static bool Fits(const FloatPair& pair) {
     const auto fits = [](const QueryHull& hull) {
-      const size_t count = hull.points_together().size();
-      return count > 0 && count <= kMaxVertices;
+      const size_t count = hull.blocks().size();
+      return count > 0 && count <= kMaxVertices / 4;
     };
     return fits(pair.a().query_hull()) && fits(pair.b().query_hull());
   }
@@ -59,8 +59,9 @@ class SmallPair {
     const Lanes turned = __builtin_shufflevector(best, best, 1, 0, 3, 2);
     best = best > turned ? best : turned;
     const LaneIds ids = reinterpret_cast<LaneIds>(best);
-    const VertexPair found = {a_.VertexOf(ids[0]), against_b_.VertexOf(ids[2])};
-    return {found, Dot(n, Difference(found))};
+    const VertexPair place = {PlaceOf(ids[0]), PlaceOf(ids[2])};
+    const VertexPair found = {std::min(place.a, a_.last), std::min(place.b, against_b_.last)};
+    return {found, Dot(n, Difference(place))};
   }
 
   [[gnu::always_inline]] PlainVector Difference(VertexPair pair) const {
@@ -75,21 +76,26 @@ class SmallPair {
   // The low bits of a value, which contain its vertex number.
   static constexpr int64_t kIdMask = kMaxVertices - 1;
 
+  static uint32_t PlaceOf(int64_t numbered) { return static_cast<uint32_t>(numbered & kIdMask); }
+
   struct Side {
     // Stores the vertices in the pair's frame, times `sign`; repeats the last one to fill up.
     [[gnu::always_inline]] void Fill(const PlacedHull& placed, const PlainVector& offset,
                                      double sign) {
-      const std::span<const Vector> vertices = placed.query_hull().points_together();
-      last = static_cast<uint32_t>(vertices.size()) - 1;
+      const std::span<const SupportBlock> blocks = placed.query_hull().blocks();
+      last = placed.query_hull().point_count() - 1;
       const double* const R = placed.R_WH().data();  // column by column
       for (uint32_t block = 0; block < kMaxVertices; block += 4) {
-        const Vector& p0 = vertices[std::min(block, last)];
-        const Vector& p1 = vertices[std::min(block + 1, last)];
-        const Vector& p2 = vertices[std::min(block + 2, last)];
-        const Vector& p3 = vertices[std::min(block + 3, last)];
-        const Lanes own_x = {p0.x(), p1.x(), p2.x(), p3.x()};
-        const Lanes own_y = {p0.y(), p1.y(), p2.y(), p3.y()};
-        const Lanes own_z = {p0.z(), p1.z(), p2.z(), p3.z()};
+        const SupportBlock& own = blocks[std::min<size_t>(block / 4, blocks.size() - 1)];
+        Lanes own_x, own_y, own_z;
+        std::memcpy(&own_x, own.x, sizeof own_x);
+        std::memcpy(&own_y, own.y, sizeof own_y);
+        std::memcpy(&own_z, own.z, sizeof own_z);
+        if (block / 4 >= blocks.size()) {
+          own_x = __builtin_shufflevector(own_x, own_x, 3, 3, 3, 3);
+          own_y = __builtin_shufflevector(own_y, own_y, 3, 3, 3, 3);
+          own_z = __builtin_shufflevector(own_z, own_z, 3, 3, 3, 3);
+        }
         const auto store = [&](int row, double shift, double* to) __attribute__((always_inline)) {
           const Lanes position =
               sign * (((R[row] * own_x + R[row + 3] * own_y) + R[row + 6] * own_z) + shift);
@@ -124,10 +130,6 @@ class SmallPair {
       const LaneIds ids = {id, id + 1, id + 2, id + 3};
       numbered = reinterpret_cast<Lanes>((bits & ~kIdMask) | ids);
     }
-    [[gnu::always_inline]] uint32_t VertexOf(int64_t numbered) const {
-      return std::min(static_cast<uint32_t>(numbered & kIdMask), last);
-    }
-
     alignas(32) double x[kMaxVertices];
     alignas(32) double y[kMaxVertices];
     alignas(32) double z[kMaxVertices];

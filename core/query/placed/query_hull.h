@@ -59,6 +59,12 @@ class QueryHull {
   std::span<const Vector> points_together() const {
     return base_ == nullptr || growth_ != nullptr ? std::span<const Vector>() : base_->points();
   }
+  // The blocks of a support map that has all points; empty for large hulls and where
+  // points_together() is empty.
+  std::span<const SupportBlock> blocks() const {
+    return base_ == nullptr || growth_ != nullptr ? std::span<const SupportBlock>()
+                                                  : base_->support().blocks();
+  }
   // Largest absolute coordinate; 0 if empty.
   double max_abs_coordinate() const { return max_abs_; }
   // A point in the hull where searches start; zero if empty.

@@ -81,6 +81,8 @@ class SupportMap {
 
   bool stopped() const { return stopped_; }
   bool scans() const { return cells_.empty(); }
+  // All points of a small set, with the last one repeated to fill the last block; otherwise empty.
+  std::span<const SupportBlock> blocks() const { return blocks_; }
   size_t MemoryBytes() const;
 
  private:
