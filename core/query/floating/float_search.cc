@@ -10,6 +10,7 @@
 #include "core/numeric/simd_path.h"
 #include "core/query/floating/small_pair.h"
 #include "core/query/terms/minkowski_vertex.h"
+#include "core/query/terms/separation_bounds.h"
 
 namespace hulld {
 namespace {
@@ -284,8 +285,7 @@ class FloatSearch {
     double largest = LargestComponent(n);
     if (!IsFilterDirection(largest)) {
       if (!(largest > 0)) return false;
-      const double unit = std::ldexp(1.0, std::ilogb(largest));
-      n = {n.x / unit, n.y / unit, n.z / unit};
+      n = 1 / UnitOf(largest) * n;
       largest = LargestComponent(n);
     }
     ++result_.directions_tried;

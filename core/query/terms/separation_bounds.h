@@ -1,8 +1,9 @@
 #ifndef HULLD_CORE_QUERY_TERMS_SEPARATION_BOUNDS_H_
 #define HULLD_CORE_QUERY_TERMS_SEPARATION_BOUNDS_H_
 
+#include <algorithm>
 #include <array>
-#include <cmath>
+#include <bit>
 #include <cstdint>
 #include <limits>
 
@@ -53,9 +54,13 @@ struct SeparationBounds {
   double point_length = 0;
 };
 
-// Returns a power of two with an integer exponent near a positive size: lengths divided by it are
-// near 1.
-inline double UnitOf(double size) { return std::ldexp(1.0, std::ilogb(size)); }
+// Returns the largest power of two that is at most a positive size, or the least normal double:
+// lengths divided by it are near 1.
+inline double UnitOf(double size) {
+  constexpr uint64_t kExponent = uint64_t{0x7ff} << 52;
+  return std::bit_cast<double>(
+      std::max(std::bit_cast<uint64_t>(size) & kExponent, uint64_t{1} << 52));
+}
 
 }  // namespace hulld
 
