@@ -110,17 +110,18 @@ class SeparationSearch {
       goal.relative_error = kDefaultRelativeMaxError;
       goal.size = size_;
     }
-    const bool close = core_ != Relation::kTouching && BoundClosely(goal, request.witness);
+    std::optional<Separation> close;
+    if (core_ != Relation::kTouching) close = BoundClosely(goal, request.witness);
     if (poll_.stopped()) return Stopped();
     if (request.separation) {
       if (close) {
-        answer.separation = FromBounds();
+        answer.separation = *close;
       } else if (absl::Status s = AddExactSeparation(answer); !s.ok()) {
         return s;
       }
     }
     if (!request.witness) return absl::OkStatus();
-    if (close && AddFloatWitness(answer)) return absl::OkStatus();
+    if (close && AddFloatWitness(close->bound, answer)) return absl::OkStatus();
     return AddExactWitness(answer);
   }
 
@@ -256,8 +257,8 @@ class SeparationSearch {
     return core_ == Relation::kSeparated ? -point : point;
   }
 
-  // Improves the bounds. Returns true if FromBounds then meets the goal.
-  bool BoundClosely(const SeparationGoal& goal, bool want_point) {
+  // Improves the bounds. Returns the separation if they meet the goal.
+  std::optional<Separation> BoundClosely(const SeparationGoal& goal, bool want_point) {
     SeparationGoal of_cores = goal;
     if (!radii_.is_zero()) {
       // The value may be less than the separation of the cores, by no more than the size.
@@ -265,11 +266,13 @@ class SeparationSearch {
       of_cores.relative_error /= 4;
     }
     Bound(of_cores, want_point);
-    if (poll_.stopped() || !std::isfinite(bounds_.high)) return false;
+    if (poll_.stopped() || !std::isfinite(bounds_.high)) return std::nullopt;
     const Separation found = FromBounds();
-    return std::isfinite(found.bound) && SignOf(relation_) * found.value > 0 &&
-           found.bound <=
-               goal.absolute_error + goal.relative_error * (goal.size + std::abs(found.value));
+    const double allowed =
+        goal.absolute_error + goal.relative_error * (goal.size + std::abs(found.value));
+    const bool met =
+        std::isfinite(found.bound) && SignOf(relation_) * found.value > 0 && found.bound <= allowed;
+    return met ? std::optional(found) : std::nullopt;
   }
 
   // Returns the separation from bounds of that of the cores. Requires: finite bounds.
@@ -305,15 +308,15 @@ class SeparationSearch {
     return {SignOf(core_) * length.value, length.bound};
   }
 
-  // Returns false if the point is not known accurately enough.
-  bool AddFloatWitness(SeparationAnswer& answer) const {
+  // Returns false if the point is not known accurately enough. `bound`: that of the separation.
+  bool AddFloatWitness(double bound, SeparationAnswer& answer) const {
     const FloatCombination& point = bounds_.point;
     // Radii multiply the error of the direction, which only exact arithmetic keeps small.
     if (point.count == 0 || !radii_.is_zero()) return false;
     const double rounding = kCombinationErrorFactor * pair_.size();
     const double width =
         std::max(bounds_.point_length - bounds_.low, bounds_.high - bounds_.point_length);
-    if (width > 4 * (MiddleOf(bounds_).bound + rounding)) return false;
+    if (width > 4 * (bound + rounding)) return false;
     Vector p_A = Vector::Zero();
     Vector p_B = Vector::Zero();
     for (uint32_t i = 0; i < point.count; ++i) {
