@@ -107,7 +107,7 @@ TEST(UrdfFile, ErrorsNameLineAndElement) {
     std::pair<std::string, std::string> change;
     const char* error;
   } cases[] = {
-      {{"size=\"2 2 1\"", "size=\"2 2\""}, "arm.urdf:5: <box> size takes 3 numbers, got 2"},
+      {{"size=\"2 2 1\"", "size=\"2 2\""}, "arm.urdf:5: <box> size needs 3 numbers, got 2"},
       {{"size=\"2 2 1\"", "size=\"2 two 1\""}, "arm.urdf:5: <box> size: \"two\" is not a number"},
       {{"size=\"2 2 1\"", "size=\"2 0 1\""}, "arm.urdf:5: <box> size must be above 0"},
       {{"size=\"2 2 1\"", ""}, "arm.urdf:5: <box> lacks size=\"...\""},

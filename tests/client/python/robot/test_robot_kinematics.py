@@ -180,7 +180,7 @@ def test_configurations_are_checked(write: Write) -> None:
         ),
         ('<parent link="upper"/>', '<parent link="tip"/>', "11: link 'hand' is part of a cycle"),
         ('"0 0 3"', '"0 0 0"', "9: <axis> xyz must not be 0 0 0"),
-        ('"0 0 3"', '"0 0"', "9: <axis> xyz takes 3 numbers, got 2"),
+        ('"0 0 3"', '"0 0"', "9: <axis> xyz needs 3 numbers, got 2"),
         ('"0 0 3"', '"0 0 nan"', "9: <axis> xyz: 'nan' is not a finite number"),
         ('"0 0 3"', '"0 0 1e999"', "'1e999' is not a finite number"),
         ('"0 0 3"', '"0 0 1_0"', "'1_0' is not a finite number"),
@@ -190,7 +190,7 @@ def test_configurations_are_checked(write: Write) -> None:
         ('joint="j1"', 'joint="j3"', "12: joint 'j3' mimics itself"),
         ('joint="j1"', 'joint="cart"', "14: joint 'cart' is planar"),
         ('<box size="1 1 1"/>', '<box size="1 0 1"/>', "2: <box> size must be above 0"),
-        ('<box size="1 1 1"/>', '<box size="1 1"/>', "2: <box> size takes 3 numbers, got 2"),
+        ('<box size="1 1 1"/>', '<box size="1 1"/>', "2: <box> size needs 3 numbers, got 2"),
         (
             '<box size="1 1 1"/>',
             '<cone size="1 1"/>',
