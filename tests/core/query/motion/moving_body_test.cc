@@ -211,7 +211,7 @@ TEST(MovingBody, EmptyBodiesAndPiecesNeverMeet) {
 TEST(MovingBody, TranslationsOfPosedPiecesAreExact) {
   Random random(TestSeed(2));
   std::array<int, 3> relations = {};
-  for (int round = 0; round < 25; ++round) {
+  for (int round = 0; round < 50; ++round) {
     SCOPED_TRACE(round);
     OwnMovingBody a(Translation({0, 0, 0}, LatticeVector(random, 2)));
     const Vector from = LatticeVector(random, 7);
