@@ -50,8 +50,7 @@ inline constexpr ClientId kWatchReader = {2};
 class RecordReader : public PeerChangeListener, public PageSource {
  public:
   // All must outlive this. loaders: threads for reads without a blocked caller, and for watches.
-  RecordReader(RegistryState& state, Committer& committer, ReadBarrier& barrier,
-               TaskPool& loaders)
+  RecordReader(RegistryState& state, Committer& committer, ReadBarrier& barrier, TaskPool& loaders)
       : state_(state), committer_(committer), barrier_(barrier), loaders_(loaders) {}
   RecordReader(const RecordReader&) = delete;
   RecordReader& operator=(const RecordReader&) = delete;
