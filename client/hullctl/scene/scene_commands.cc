@@ -59,6 +59,7 @@ absl::Status Confirm(const Invocation& run, const std::vector<Kept>& targets,
                      const std::string& unless) {
   if (targets.empty()) return absl::OkStatus();
   std::vector<std::string> ids;
+  ids.reserve(targets.size());
   for (const Kept& kept : targets) ids.push_back(kept.id);
   const bool has_body = targets.front().is_body;
   const bool has_hull = !targets.back().is_body;
