@@ -37,10 +37,10 @@ absl::Status CheckFirstContact(v1::Relation relation, const v1::FirstContact& co
                                const v1::Certificate& at_contact, const MovingVertices& a,
                                const MovingVertices& b, double max_time_error);
 
-// As above, for two bodies. a, b: all pieces of each body, in order. Every pair of nonempty pieces
-// needs intervals up to contact.separated_until. If the bodies meet, one pair must be in contact
-// and have the relation of the bodies. For translations without radii, that pair may be TOUCHING
-// while the bodies are OVERLAPPING, at a later time.
+// Checks the first contact of two bodies likewise. a, b: all pieces of each body, in order. Every
+// pair of nonempty pieces must have intervals up to contact.separated_until. If the bodies meet,
+// one pair must be in contact and have the relation of the bodies; for translations without radii,
+// it may be TOUCHING if the bodies are OVERLAPPING, because they may overlap later.
 absl::Status CheckFirstContact(v1::Relation relation, const v1::FirstContact& contact,
                                const PieceCertificates& certificates,
                                std::span<const MovingVertices> a, std::span<const MovingVertices> b,

@@ -81,12 +81,12 @@ inline constexpr double kRotationEntryError = 16 * kUnitRoundoff;
 // largest component. Proven.
 inline constexpr double kProductTranslationError = 256 * kUnitRoundoff * kUnitRoundoff;
 
-// The same translation at a time of a motion. Interpolation adds an error of e = 18 u^2 to each
-// component of q; the largest component, m, is at most |q|. Numerators of the entries and the
-// squared norm change by at most 4 e |q|, so entries change by 8 e / m and the translation by 432
-// u^2 / m |t_P|. Products of components err by 5 u^2 of themselves: 10 u^2 per entry, 30 u^2 |t_P|
-// in total. Interpolating t_B between x0 and x1 adds 9 u^2 (|x0| + |x1|). Both are within the slack
-// of kProductTranslationError. Times |t_P| / m. Proven.
+// The translation of a product of poses at a time of a motion. Interpolation adds an error of e =
+// 18 u^2 to each component of q, whose largest component m is at most |q|. This changes the
+// numerators of the entries and the squared norm by at most 4 e |q|, so entries change by 8 e / m
+// and the translation by 432 u^2 / m |t_P|. Products of components err by 5 u^2 of themselves: 10
+// u^2 per entry, 30 u^2 |t_P| in total. Interpolating t_B between x0 and x1 adds 9 u^2 (|x0| +
+// |x1|). Both are within the slack of kProductTranslationError. Times |t_P| / m. Proven.
 inline constexpr double kProductTurnError = 512 * kUnitRoundoff * kUnitRoundoff;
 
 // The difference of two translations, at least one of which belongs to a product of poses. The

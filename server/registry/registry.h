@@ -37,9 +37,8 @@ namespace hulld::server {
 //   RegistryState  the state that the parts share, and the only functions that apply a committed
 //                  change to it
 //   Committer      commits changes to the store in batches, in the order of submission
-//   ReadBarrier    blocks a call until the registry satisfies its freshness; PeerSync replaces it
-//   if
-//                  peer servers commit to the same store, and applies their changes
+//   ReadBarrier    blocks a call until the registry satisfies its freshness; replaced by PeerSync,
+//                  which applies the changes of peer servers, if there are any
 //   RecordReader   loads and lists records if the store finds records
 //   HullChanges    creates, deletes, replaces, and grows hulls
 //   BodyRegistry   puts, deletes, and finds bodies

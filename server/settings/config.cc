@@ -210,7 +210,7 @@ class Parser {
         return absl::InvalidArgumentError(
             absl::StrCat(where, "the value of ", key, " is not a string, number, or boolean"));
       }
-      // As in variables, an empty string means the default.
+      // An empty string stands for the default, as in an environment variable.
       const std::string text = ValueText(value);
       if (!text.empty()) settings.push_back({absl::StrCat("--", key, "=", text), where});
     }

@@ -75,7 +75,7 @@ absl::Status RocksDbStore::ScanRange(
   }
   std::string next = begin;
   const rocksdb::Slice upper_bound(end);
-  // As in Read: after a damaged block, the scan continues without the checksums of blocks.
+  // After a damaged block, the scan continues without checking the checksums of blocks, as in Read.
   for (const bool verify : {true, false}) {
     rocksdb::ReadOptions options;
     options.verify_checksums = verify;

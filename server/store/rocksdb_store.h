@@ -128,7 +128,7 @@ class RocksDbStore : public Store {
   void CountWriteFailure();
   // Counts the failure, and returns its error for the client.
   absl::Status WriteFailed(const rocksdb::Status& status);
-  // As above. DATA_LOSS: the value is damaged, which is no failure of the disk.
+  // As above, for a read. DATA_LOSS: the value is damaged; not counted as a failure of the disk.
   absl::Status ReadFailed(const rocksdb::Status& status);
   absl::Status ReadMeta();
   absl::Status InitializeMeta();

@@ -78,11 +78,11 @@ class CollisionStream:
     def update(
         self, placements: npt.ArrayLike, poses: PosesLike, *, refresh_hulls: bool = False
     ) -> StreamAnswer:
-        """Moves placements. The answer contains every pair with a moved placement or, with
-        only_changes, the pairs whose relation changed.
+        """Moves placements and returns the answers for every pair with a moved placement or, with
+        only_changes, for the pairs whose relation changed.
 
         placements: k distinct indices into the placements of the stream. poses: their new poses,
-        k x 7, k x 4 x 4, or k x 3. refresh_hulls: resolves every hull again before answering; a
+        k x 7, k x 4 x 4, or k x 3. refresh_hulls: look up every hull again before answering; a
         placement whose hull changed counts as moved.
 
         ValueError: an index is out of range, a pose is malformed, or there are not k poses. Nothing

@@ -66,7 +66,7 @@ class PlacementTable {
   absl::Status Refresh(Registry& registry, const QueryOptions& options, const ReadPlan& plan);
 
   size_t size() const { return hull_of_.size(); }
-  // Number of distinct hulls: those of hull_ids(), followed by those of the inline shapes.
+  // Number of distinct hulls. The hulls of hull_ids() come first, then those of inline shapes.
   size_t hull_count() const { return ids_.size() + shape_count_; }
   // Approximate bytes held after resolution, excluding hulls.
   size_t MemoryBytes() const;

@@ -42,10 +42,10 @@ struct CommitStatistics {
 // acquired after `order`, and no callback runs under it. No lock is held during store calls.
 class Committer {
  public:
-  // Completion of a change: OK if it is committed, else the reason for the refusal; and the change,
-  // with the revisions that the store assigned. Called exactly once, on the committer's thread,
-  // with `order` held, in the order of submission. No submission occurs between the refusals of one
-  // batch. May submit the next change.
+  // Receives the outcome of a change, OK or the reason for its refusal, and the change with the
+  // revisions that the store assigned. Called exactly once, on the committer's thread, with `order`
+  // held, in the order of submission. Nothing is submitted between the refusals of a batch. May
+  // submit the next change.
   using Completion = std::function<void(Locked& order, const absl::Status&, Change&)>;
 
   // True if a change is refused because a peer server changed the same ID first (shared store). Its

@@ -354,7 +354,7 @@ absl::Status PostgresStore::RenewWriter() {
   return absl::OkStatus();
 }
 
-// Reads the state of the store from the row of a claim, whose columns begin with those read here.
+// Runs a claim and reads the state of the store from the first columns of the returned row.
 absl::StatusOr<Rows> PostgresStore::Claim(Statement claim) {
   absl::StatusOr<Rows> rows = writer_->Ask(std::move(claim));
   if (!rows.ok()) return rows;

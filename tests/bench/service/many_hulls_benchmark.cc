@@ -2,10 +2,10 @@
 //
 //   many_hulls_benchmark [--hulls N] [DIRECTORY]
 //
-// Creates N (100000) boxes, in memory or in a RocksDB store in a new DIRECTORY. One row of CSV per
-// step: heap per hull after it, bytes per hull that count against --memory-limit, processor time of
-// this process per hull, and resident memory. A question resolves all hulls in one call, as a batch
-// that names each once; `idle` is what the server does every ten seconds.
+// Creates N boxes (default 100000), in memory or in a RocksDB store in a new DIRECTORY. Prints a
+// CSV row for each step: heap per hull after it, bytes per hull that count against --memory-limit,
+// processor time of this process per hull, and resident memory. A question resolves all hulls in
+// one call, as a batch that names each once; `idle` is what the server does every ten seconds.
 
 #include <malloc.h>
 #include <unistd.h>

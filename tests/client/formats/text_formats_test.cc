@@ -51,7 +51,7 @@ TEST(ObjFile, FacesOfABrokenFileAreErrors) {
             "FILE: contains no vertices: no line starts with v; is it an OBJ file?");
 }
 
-// Of an OBJ file, lines with an unknown keyword are ignored: a block of zeros lost vertices.
+// The OBJ reader ignores lines with an unknown keyword, so a block of zeros used to hide vertices.
 TEST(TextFiles, BytesThatNoTextContainsAreErrors) {
   const std::string zeros(4, '\0');
   EXPECT_THAT(ReadText("v 1 2 3\n" + zeros + "\nv 4 5 6\n", PointFormat::kObj).error(),
