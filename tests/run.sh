@@ -174,7 +174,7 @@ finish_packages() { [[ -z ${background[packages]-} ]] || run_part "more packages
 case $mode in
   quick)
     run_part "configure" cmake --preset release &&
-      run_part "build" build release "${core_targets[@]}" print_constants hulld hullctl &&
+      run_part "build" build release "${core_targets[@]}" print_constants hulld smoke_client &&
       run_part "tests" run_tests release -L '^(core|core-threads|digest-threads|smoke)$' -LE "^(slow|$rare)$"
     ;;
   default)
