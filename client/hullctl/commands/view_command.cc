@@ -460,7 +460,7 @@ void AddViewCommand(Command program, Invocation* invocation) {
        {"All hulls with a prefix, also new ones", "hullctl view cell-3/"},
        {"A hull, and the points, mesh, and hull of a file", "hullctl view arm part.stl"},
        {"A scene", "hullctl view scene.json"},
-       {"A robot on its way", "hullctl view arm.urdf --joints path.csv"},
+       {"A robot along a trajectory", "hullctl view arm.urdf --joints path.csv"},
        {"A robot in its cell", "hullctl view arm.urdf --scene cell.yaml --ignore base,floor"},
        {"The collisions of a scene over time", "hullctl view scene.yaml --recording watch.jsonl"},
        {"A file to share", "hullctl view arm --html arm.html"},
