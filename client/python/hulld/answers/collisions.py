@@ -67,7 +67,7 @@ class AxisKind(IntEnum):
 
 @dataclass(frozen=True)
 class HullVersion:
-    """The version of a hull that an answer was computed from. Empty for an inline shape."""
+    """The version of a hull from which an answer was computed. Empty for an inline shape."""
 
     hull_id: str
     create_revision: int
@@ -248,7 +248,7 @@ class Analysis:
 
 @dataclass(frozen=True)
 class Problem:
-    """Why a placement, or a pair, has no answer. code and reason: as in HulldError."""
+    """The reason why a placement or a pair has no answer. code and reason: as in HulldError."""
 
     code: str
     message: str
