@@ -6,8 +6,8 @@ namespace hulld {
 // Exit codes. A collision is an answer, not an error.
 enum class ExitCode {
   kDone = 0,
-  // The server refused the request or failed; or an audit, a comparison, or a judgement found
-  // something.
+  // The server refused the request or failed; or an audit, a comparison, or a judgement found a
+  // fault or a difference.
   kRequestFailed = 1,
   // The command line or an input file is invalid, or an output file cannot be written.
   kUsage = 2,
