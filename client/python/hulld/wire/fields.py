@@ -175,7 +175,7 @@ def packed_floats(value: Value) -> npt.NDArray[np.float32]:
 
 def packed_varints(value: Value) -> Unsigned:
     """The numbers of a field of repeated integers, enums, or bools, packed or a single entry: as
-    uint8, and without a copy, if all are below 128, else as uint64. Cost: some ns each."""
+    uint8, and without a copy, if all are below 128, else as uint64. Cost: a few ns each."""
     if isinstance(value, int):
         return np.array([value], np.uint64)
     data = np.frombuffer(value, np.uint8)
