@@ -92,9 +92,8 @@ class Separation:
     """|value - true separation| <= bound, and the sign of the value agrees with the relation; in
     the caller's length unit.
 
-    value: the distance when positive; minus the penetration depth when negative; 0 exactly when
-    TOUCHING; infinite when a hull is empty. bound: infinite if a double cannot represent the
-    value.
+    value: the distance if positive; minus the penetration depth if negative; 0 if and only if
+    TOUCHING; infinite if a hull is empty. bound: infinite if a double cannot represent the value.
     """
 
     value: float
