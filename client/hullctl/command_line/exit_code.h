@@ -31,9 +31,8 @@ inline constexpr char kExitCodeHelp[] =
     "  3  no answer: the server is unreachable, is draining, or exceeded --timeout\n"
     "  4  some items of a batch failed\n"
     "  5  a certificate does not prove its answer\n"
-    "  6  a certificate cannot be checked: its hulls changed or were deleted, or the answer has "
-    "no\n"
-    "     certificate; if a file is not a record of an answer, the exit code is 2\n";
+    "  6  a certificate cannot be checked: its hulls changed or were deleted, or the answer has\n"
+    "     no certificate; if a file is not a record of an answer, the exit code is 2\n";
 
 }  // namespace hulld
 
