@@ -94,12 +94,12 @@ class Client {
                           std::optional<std::chrono::milliseconds> timeout = {}) const;
 
   absl::StatusOr<v1::GetHullResponse> GetHull(const std::string& hull_id, bool audit = false) const;
-  // Same as above, with every option of the request, such as properties.
+  // The same, with all options of the request, such as properties.
   absl::StatusOr<v1::GetHullResponse> GetHull(const v1::GetHullRequest& request) const;
 
   // INTERNAL: the stream is inconsistent.
   absl::StatusOr<HullMesh> GetHullMesh(const std::string& hull_id) const;
-  // Same as above, with every option of the request, such as a simplification. `on_part`, if set,
+  // The same, with all options of the request, such as a simplification. `on_part`, if set,
   // receives the mesh so far after each part, header first; a retried call starts over.
   absl::StatusOr<HullMesh> GetHullMesh(
       const v1::GetHullMeshRequest& request,
@@ -108,8 +108,8 @@ class Client {
   // Returns one page.
   absl::StatusOr<v1::ListHullsResponse> ListHulls(const v1::ListHullsRequest& request) const;
 
-  // Follows the pages to the last, or until `limit` hulls are read (0: no limit). The header is
-  // that of the last page; next_page_token is empty unless the limit cut the list.
+  // Reads all pages, or until `limit` hulls are read (0: no limit). The header is that of the last
+  // page; next_page_token is empty unless the limit ended the list.
   absl::StatusOr<v1::ListHullsResponse> ListAllHulls(const std::string& prefix,
                                                      uint64_t limit = 0) const;
 

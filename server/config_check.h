@@ -25,9 +25,9 @@ absl::Status CheckListening(const Config& config);
 // --data-dir.
 absl::Status CheckDataDir(const std::string& path);
 
-// OK if this file holds a PostgreSQL connection string that only the process's user can read; does
-// not contact the database. INVALID_ARGUMENT names the setting that refers to the file, and quotes
-// nothing from the file.
+// Returns OK if this file contains a PostgreSQL connection string that only the process's user can
+// read; does not contact the database. INVALID_ARGUMENT names the setting that refers to the file,
+// and quotes nothing from the file.
 absl::Status CheckConninfoFile(const std::string& path,
                                const char* setting = "--postgres-conninfo-file");
 

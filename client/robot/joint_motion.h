@@ -25,11 +25,11 @@ struct MotionBound {
   double quaternion_rounding = 0;
   double rounding = 0;
 
-  // Returns an upper bound (proven) of the path length of every point within `reach` of the origin,
+  // Returns an upper bound (proven) on the path length of every point within `reach` of the origin,
   // in a time span of this duration.
   double Travel(double duration, double reach) const;
 
-  // Returns an upper bound (proven) of the distance between the exact position of a point within
+  // Returns an upper bound (proven) on the distance between the exact position of a point within
   // `reach` of the origin and its position in the motion of Placement.end_pose between the
   // computed poses at the ends of a time span of this duration, at the same time, for normalized
   // quaternions that are not negated.

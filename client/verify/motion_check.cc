@@ -169,7 +169,7 @@ struct HalfSpace {
     const BigInteger minus = -1;
     return {{minus * n[0], minus * n[1]}, {-offset[0], -offset[1]}};
   }
-  // An upper bound of |n|^2 over the interval.
+  // An upper bound on |n|^2 over the interval.
   BigInteger GreatestSquare() const { return std::max(Dot(n[0], n[0]), Dot(n[1], n[1])); }
 };
 

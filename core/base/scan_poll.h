@@ -7,8 +7,8 @@
 
 namespace hulld {
 
-// Polls a caller's should_stop within scans of many items. Short scans do not poll, so they pay
-// nothing. Thread-safe if should_stop is.
+// Polls a caller's should_stop within scans of many items. Short scans do not poll, so they have no
+// overhead. Thread-safe if should_stop is.
 class ScanPoll {
  public:
   static constexpr size_t kItemsPerPoll = 1024;

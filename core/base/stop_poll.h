@@ -9,8 +9,8 @@
 namespace hulld {
 
 // Polls a caller's should_stop during long work: at the first step, so that abandoned work does not
-// start, and then every `steps_per_poll` steps. After should_stop returns true it is not polled
-// again. Not thread-safe; threads that share work have a poll each.
+// start, and then every `steps_per_poll` steps. After should_stop returns true, it is not polled
+// again. Not thread-safe; each of several threads that share work needs a poll of its own.
 class StopPoll {
  public:
   // For steps that take at most about 10 us each, most of them far less.
@@ -29,8 +29,8 @@ class StopPoll {
   StopPoll(const StopPoll&) = delete;
   StopPoll& operator=(const StopPoll&) = delete;
 
-  // Counts steps of work about to be done. Returns true if the work should stop, now or since an
-  // earlier step.
+  // Counts steps of work that is about to be done. Returns true if should_stop has returned true,
+  // now or at an earlier step.
   bool Step(uint64_t steps = 1) {
     if (steps_left_ >= steps) {
       steps_left_ -= steps;

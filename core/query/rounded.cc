@@ -106,7 +106,7 @@ class RoundedSearch {
   }
 
   bool IsWithinTolerance() const {
-    // If the cores overlap, 0 is not a lower bound of their separation.
+    // If the cores overlap, 0 is not a lower bound on their separation.
     return bounds_.low > 0 &&
            std::nextafter(bounds_.high - radii_.low(), kInfinity) <= tolerance_ &&
            std::nextafter(radii_.high() - bounds_.low, kInfinity) <= tolerance_;

@@ -48,7 +48,7 @@ constexpr double kNormalRelativeError = kMaxNormalAngle * kMaxNormalAngle / 8;
 // Frobenius norm of two differences of computed vertices of A errs by no more. Times S. Proven.
 constexpr double kSpanErrorFactor = 1024 * kUnitRoundoff;
 
-// Lower bounds of the distance in a plane of the origin from an edge of two computed Minkowski
+// Lower bounds on the distance in a plane of the origin from an edge of two computed Minkowski
 // vertices p and q, n . (p x q) / |q - p| for a unit vector n across the plane (length within 8 u
 // of 1): each vertex errs by sqrt(3) * 128 u S = 222 u S and is at most 7 S, so the product by 2 *
 // 7 * 223 u S^2, and by 11 u * 49 S^2 for rounding and the length of n: below 4000 u S^2. The
@@ -399,7 +399,7 @@ class SeparationSearch {
     return true;
   }
 
-  // Returns an upper bound of the angle between `bounds_.direction` and the normal if the point
+  // Returns an upper bound on the angle between `bounds_.direction` and the normal if the point
   // that attains the separation is inside a facet of known corners p_i, otherwise infinity. Let m
   // be the distance of the axis through the origin along the direction from the edges, seen along
   // the axis: points of the facet project onto m e for all e across.

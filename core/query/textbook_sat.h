@@ -49,7 +49,7 @@ class TextbookSearch {
   absl::StatusOr<Answer> Finish();
 
   // Memory: positions of the vertices of both hulls. Once floating point leaves an axis open, also
-  // every vertex in integers, some 500 bytes each.
+  // every vertex in integers, about 500 bytes each.
   size_t MemoryBytes() const;
 
  private:

@@ -15,9 +15,10 @@
 namespace hulld::server {
 
 // Open connections, limited in total and per network. A connection is idle while no call runs on
-// it. If a new connection exceeds a limit, the longest idle one is evicted; for the limit per
-// network, the longest idle one of that network. Connections of unix sockets belong to no network,
-// and are never idle, because their calls cannot be attributed. Thread-safe.
+// it. If a new connection exceeds a limit, the connection that has been idle longest is evicted;
+// for the limit per network, the one of that network that has been idle longest. Connections of
+// unix sockets belong to no network, and are never idle, because their calls cannot be attributed.
+// Thread-safe.
 class ConnectionTable {
  public:
   ConnectionTable(size_t most, size_t max_per_network)
@@ -31,7 +32,7 @@ class ConnectionTable {
   };
   // Adds a connection, or refuses it without effect. id: unique, not 0.
   Outcome Add(uint64_t id, const std::optional<PeerAddress>& peer);
-  // Removes and returns the longest idle connection; 0: none is idle.
+  // Removes and returns the connection that has been idle longest; 0: none is idle.
   uint64_t Evict();
   void Remove(uint64_t id);
 
@@ -48,7 +49,7 @@ class ConnectionTable {
   void LimitTo(size_t most) { most_ = std::min(most_, most); }
 
  private:
-  // Idle connections, longest idle first.
+  // Idle connections, the one that has been idle longest first.
   using IdleList = std::list<uint64_t>;
   struct Network {
     size_t connections = 0;

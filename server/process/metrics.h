@@ -44,7 +44,7 @@ struct PoolMetrics {
 };
 
 // All metrics of a running server, and their exposition to Prometheus. One per server; it outlives
-// everything that updates it. Thread-safe; an update costs some tens of nanoseconds.
+// everything that updates it. Thread-safe; an update costs tens of nanoseconds.
 class Metrics : public prometheus::Collectable {
  public:
   Metrics();

@@ -35,9 +35,9 @@ class SharedLoop {
     return loop;
   }
 
-  // Works on the rest on this thread, too. Waits for started helpers, and not for queued ones, so
-  // it may be called on any thread that may block. After should_stop, which may be empty and is
-  // called only on this thread, returns true, the remaining indices are skipped.
+  // Works on the remaining ranges on this thread, too. Waits for helpers that have started, but not
+  // for queued ones, so it may be called on any thread that may block. After should_stop, which may
+  // be empty and is called only on this thread, returns true, the remaining indices are skipped.
   void Finish(const std::function<bool()>& should_stop) {
     TakePart(should_stop);
     std::unique_lock lock(mutex_);

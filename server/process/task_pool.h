@@ -35,15 +35,15 @@ class TaskPool {
   // Duration of a slice. A choice: the answer of a single call takes about as long over the wire,
   // and a task switch (**observed**: 2 us) costs a hundredth.
   static constexpr std::chrono::microseconds kSliceTime{250};
-  // While single calls arrive, and for this long after, slices leave one thread's core to them: the
-  // system runs a computing thread for some milliseconds (a tick of Linux is 1 to 10 ms) before it
-  // schedules gRPC's threads, which bring the calls.
+  // While single calls arrive, and for this long afterwards, slices leave one thread's core to
+  // them: the system runs a computing thread for some milliseconds (a tick of Linux is 1 to 10 ms)
+  // before it schedules gRPC's threads, which bring the calls.
   static constexpr std::chrono::milliseconds kReserveTime{20};
-  // During that time a thread pauses this long after each slice: the system gives its core to
-  // waiting threads of gRPC, and of clients on this machine, and would otherwise run this thread
-  // until the next tick. **Observed** on two cores: the p99 of single calls during batches is 2.2
-  // to 3.0 times that of an idle server, without pauses 7 to 9 times; batches then answer a third
-  // to a half fewer pairs (tests/bench/results/server_overload_*.csv).
+  // During that time, a thread pauses for this long after each slice, so that the system gives its
+  // core to waiting threads of gRPC, and of clients on this machine. Otherwise, the system would
+  // run this thread until the next tick. **Observed** on two cores: the p99 of single calls during
+  // batches is 2.2 to 3.0 times that of an idle server, without pauses 7 to 9 times; batches then
+  // answer a third to a half fewer pairs (tests/bench/results/server_overload_*.csv).
   static constexpr std::chrono::microseconds kPauseTime{80};
 
   // Slices of a long call. Requires at destruction: no slice is queued; each slice should therefore

@@ -369,9 +369,10 @@ class Parser {
     Add("tls-cert", config_.tls_cert,
         "PEM file with the server's certificate chain; reloaded when it changes, as are the next "
         "three files");
-    Add("tls-key", config_.tls_key, "PEM file with its private key, readable only by hulld");
+    Add("tls-key", config_.tls_key,
+        "PEM file with the private key of --tls-cert, readable only by hulld");
     Add("tls-client-ca", config_.tls_client_ca,
-        "PEM file with the authorities for client certificates; clients must then present one");
+        "PEM file with the authorities of client certificates, which clients must then present");
     Add("tokens-file", config_.tokens_file,
         "File of accepted tokens, created by 'hullctl token new'; every caller then needs one");
     app_.add_flag(
@@ -392,11 +393,11 @@ class Parser {
     AddLimit("max-textbook-axes", limits.max_textbook_axes,
              "Candidate axes of one pair under TEXTBOOK_SAT");
     AddLimit("max-writers-per-hull", limits.max_writers_per_hull,
-             "Writers of one hull with a stored sequence");
+             "Writers of one hull, for which the server stores sequence numbers");
     AddLimit(
         "max-pieces-per-body", limits.max_pieces_per_body,
-        "Pieces of one body; answers beyond 10000 may exceed the default limit of gRPC clients, "
-        "4 MiB",
+        "Pieces of one body; with more than 10000, a reply of GetBody may exceed the default limit "
+        "of gRPC clients, 4 MiB",
         kMaxPieceIndex);
     AddSize(
         "memory-limit", limits.memory_limit,
@@ -419,7 +420,7 @@ class Parser {
   void AddCallLimits() {
     Limits& limits = config_.limits;
     AddLimit("max-connections", limits.max_connections,
-             "Open connections; beyond the limit, the longest idle one is closed");
+             "Open connections; beyond the limit, the one that has been idle longest is closed");
     AddLimit("max-connections-per-address", limits.max_connections_per_address,
              "Open connections of one address, IPv6 by its first 64 bits; unix sockets are exempt");
     AddLimit("max-anonymous-calls", limits.max_anonymous_calls,

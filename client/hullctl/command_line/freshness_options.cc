@@ -54,8 +54,8 @@ void AddFreshnessOptions(Command command, Invocation* invocation) {
           [invocation](const std::string& text) {
             return TakeBound(text, FreshnessOf(invocation));
           },
-          "Accept answers up to this stale, such as 200ms, from several servers over one store "
-          "(default: answers include every acknowledged change)")
+          "With several servers over one store: accept answers that are at most this old, such as "
+          "200ms (default: answers include every acknowledged change)")
       .ValueName("TIME");
   command
       .AddParsed(
@@ -63,8 +63,8 @@ void AddFreshnessOptions(Command command, Invocation* invocation) {
           [invocation](const std::string& text) {
             return TakeRevision(text, FreshnessOf(invocation));
           },
-          "Accept this revision of the store or a later one; the header of an earlier answer has "
-          "it")
+          "Accept this revision of the store or a later one; it is in the header of an earlier "
+          "answer")
       .ValueName("STORE:REVISION");
 }
 

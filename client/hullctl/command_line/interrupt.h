@@ -8,8 +8,8 @@
 
 namespace hulld {
 
-// While it exists, SIGINT (Ctrl-C) and SIGTERM do not end the process but call a function on a
-// separate thread, so that a long-running command can end cleanly. A second signal ends the
+// While an instance exists, SIGINT (Ctrl-C) and SIGTERM do not end the process but call a function
+// on a separate thread, so that a long-running command can end cleanly. A second signal ends the
 // process. At most one instance may exist.
 class Interrupt {
  public:

@@ -32,7 +32,7 @@ void AddWantedOptions(Command command, QueryDetails* details) {
   command.AddFlag(
       "--normal", [wanted] { wanted->set_normal(true); },
       "Show the direction in which the separation is attained, with a bound on its angle");
-  command.AddLength("--clearance", "Show whether the separation is at most this",
+  command.AddLength("--clearance", "Show whether the separation is at most this length",
                     [wanted](double length) { wanted->set_clearance(length); });
   command.AddLength(
       "--tolerance",

@@ -291,12 +291,13 @@ void AddAppendCommand(Command program, Invocation* invocation) {
   command.SetDetails(
       "Formats: obj, off, ply, xyz, csv, pcd, pts (text becomes the nearest double), las, stl,\n"
       "gltf, dae.\n"
-      "--create creates the hull with its first points. Points are sent in chunks: an error\n"
-      "further on in a file leaves the chunks before it; 'hullctl replace' takes all or nothing.\n"
+      "--create creates the hull with its first points. Points are sent in chunks: if an error\n"
+      "occurs later in a file, the chunks before it remain in the hull; 'hullctl replace' takes\n"
+      "all points or none.\n"
       "--resume needs the same files, options, and writer as before.\n"
       "--split can be repeated: a body that has all parts is not changed.\n"
       "For a closed mesh, the ratio of the volumes of hull and mesh is printed, both summed\n"
-      "exactly; a ratio of 1.5 or more gives a warning.");
+      "exactly; a ratio of 1.5 or more causes a warning.");
   command.SetExamples({{"A new hull from a file", "hullctl append spider spider.obj --create"},
                        {"Points from another program", "scanner | hullctl append room - --create"},
                        {"An append that can be resumed after an interruption",

@@ -189,8 +189,8 @@ void AddContextCommand(Command program, Invocation* invocation) {
       "Contexts are kept in $XDG_CONFIG_HOME/hullctl/contexts.json, by default below ~/.config,\n"
       "with paths of token files, never tokens. Precedence: an option; the context of --context;\n"
       "the environment; the context of $HULLCTL_CONTEXT or of 'context use'; the default. A\n"
-      "context applies only to its own server: if --server or $HULLCTL_SERVER gives another, its\n"
-      "token and authorities are ignored, too.");
+      "context applies only to its own server: if --server or $HULLCTL_SERVER names another one,\n"
+      "the context is ignored together with its token and authorities.");
   Command add = command.AddCommand("add", "Save --server and its options under a name");
   add.AddText("NAME", &arguments->name, "Name of the context").Required();
   add.AddFlag("--replace", &arguments->replace, "Replace an existing context of this name");

@@ -131,7 +131,7 @@ void AddGetCommand(Command program, Invocation* invocation) {
       .Completes(ValueKind::kHull);
   command.AddFlag(
       "--properties", [asked] { asked->set_properties(true); },
-      "Show volume, area, centroid, and inertia tensor about it, at density 1");
+      "Show volume, area, centroid, and the inertia tensor about the centroid, for density 1");
   command.AddFlag(
       "--audit", [asked] { asked->set_audit(true); },
       "Have the server check the hull with independent code");

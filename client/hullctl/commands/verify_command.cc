@@ -55,9 +55,9 @@ void AddVerifyCommand(Command program, Invocation* invocation) {
   command.AddText("FILE", path.get(), "The answer; - is standard input").Required();
   command.SetDetails(
       "FILE is written by 'hullctl check A B --record FILE'. The vertices come from the server;\n"
-      "the arithmetic is exact and shares no code with it. The answer for a hull that has changed\n"
-      "since cannot be checked, which does not mean that it is wrong; 'hullctl check --verify'\n"
-      "checks an answer immediately.");
+      "the check is in exact arithmetic and shares no code with it. If a hull has changed since\n"
+      "then, the answer cannot be checked, which does not mean that it is wrong. To check an\n"
+      "answer immediately, use 'hullctl check --verify'.");
   command.SetExamples(
       {{"", "hullctl check arm box --record answer.json"}, {"", "hullctl verify answer.json"}});
   command.OnGiven([=] { invocation->action = [=] { return Verify(*invocation, *path); }; });

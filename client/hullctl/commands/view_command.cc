@@ -195,7 +195,7 @@ class Viewing {
                        watch->placements - 1, ", but ", things[0], " ends before it"));
     }
     scene->watch = std::move(watch->messages);
-    scene->note = absl::StrCat("A recorded watch: the time line shows the ",
+    scene->note = absl::StrCat("A recorded watch: the timeline shows the ",
                                watch->is_of_pairs ? "pairs that collided" : "hulls that existed",
                                ". Shapes and answers are current.");
     return absl::OkStatus();
@@ -447,12 +447,12 @@ void AddViewCommand(Command program, Invocation* invocation) {
       "\n"
       "A scene is YAML or JSON, as for 'hullctl scene'; --local also creates its hulls and\n"
       "bodies. If placements move ('to'), a slider plays the motion and marks the first contact\n"
-      "of the selected pair. A robot has a slider for each joint and, with --joints, a time line\n"
+      "of the selected pair. A robot has a slider for each joint and, with --joints, a timeline\n"
       "that marks the waypoints in contact. Its pairs are those of 'hullctl robot check'. With\n"
       "--scene, they include pairs of a part and a placement of that file, whose hulls must be on\n"
       "the server unless --local creates them.\n"
       "\n"
-      "--recording adds a time line to the scene that 'hullctl watch --scene' watched: it shows\n"
+      "--recording adds a timeline to the scene that 'hullctl watch --scene' watched: it shows\n"
       "the pairs that collided at each moment. With the output of 'hullctl watch PREFIX', it\n"
       "shows which hulls existed.");
   command.SetExamples(
@@ -460,7 +460,7 @@ void AddViewCommand(Command program, Invocation* invocation) {
        {"All hulls with a prefix, also new ones", "hullctl view cell-3/"},
        {"A hull, and the points, mesh, and hull of a file", "hullctl view arm part.stl"},
        {"A scene", "hullctl view scene.json"},
-       {"A robot on its way", "hullctl view arm.urdf --joints path.csv"},
+       {"A robot along a trajectory", "hullctl view arm.urdf --joints path.csv"},
        {"A robot in its cell", "hullctl view arm.urdf --scene cell.yaml --ignore base,floor"},
        {"The collisions of a scene over time", "hullctl view scene.yaml --recording watch.jsonl"},
        {"A file to share", "hullctl view arm --html arm.html"},

@@ -199,12 +199,13 @@ void AddWatchCommand(Command program, Invocation* invocation) {
   command.SetDetails(
       "Prints one line per event: kind, ID, revision, vertices and points, and box; for a body,\n"
       "its number of pieces. The initial state comes first (PRESENT) and ends with a line\n"
-      "'# synced'. Then come CREATED, CHANGED, REPLACED, and DELETED. Of many changes at once,\n"
-      "only the last state of each hull is printed, as PRESENT if they take several messages.\n"
+      "'# synced'. Then come CREATED, CHANGED, REPLACED, and DELETED. If a hull changes\n"
+      "several times before it is printed, only its last state is. If the pending changes take\n"
+      "several messages, the hulls are printed as PRESENT.\n"
       "With --scene: kind (ENTER, TOUCH, EXIT; with a clearance, NEAR and FAR; LOST if a hull is\n"
       "deleted), the two placements, the revisions of their hulls or bodies, and, for bodies, the\n"
       "deciding pieces. Poses are fixed; pairs change as hulls grow and bodies are replaced.\n"
-      "A watch that loses the server reconnects within --timeout and resumes where it was.\n"
+      "A watch that loses the server reconnects within --timeout and resumes.\n"
       "With --output json, each message of the contract is one line; 'hullctl view --recording'\n"
       "plays such a file. Ctrl-C ends the watch.");
   command.SetExamples(

@@ -40,8 +40,8 @@ struct JudgedAnswer {
 // semicolons, tabs, or spaces. Columns: a and b; for each of them a pose, as in a_x a_y a_z a_qw
 // a_qx a_qy a_qz (default: identity), and the pose at the end of a motion, as in a_to_x (default:
 // the pose); and at least one of relation, colliding, distance, depth, and contact_time, with empty
-// cells for answers that are not given. `ignored` receives the names of other columns but us.
-// INVALID_ARGUMENT names the line and the column.
+// cells for answers that are not given. `ignored` receives the names of all other columns except
+// `us`. INVALID_ARGUMENT names the line and the column.
 absl::StatusOr<std::vector<JudgedAnswer>> ReadJudgedTable(const std::string& path,
                                                           std::vector<std::string>* ignored);
 

@@ -28,9 +28,9 @@ struct MeshPiece {
   TriangleMesh mesh;
 };
 
-// Returns true if the mesh is closed and no vertex is outside of the plane of a triangle by more
-// than a thousandth of the mesh size, because decompositions round their vertices. Meshes of more
-// than 4096 vertices, which no decomposition produces, count as not convex. Cost: vertices times
+// Returns true if the mesh is closed and no vertex is outside the plane of a triangle by more than
+// a thousandth of the mesh size, because decompositions round their vertices. Meshes of more than
+// 4096 vertices, which no decomposition produces, count as not convex. Cost: vertices times
 // triangles.
 bool IsConvexPart(const TriangleMesh& mesh);
 

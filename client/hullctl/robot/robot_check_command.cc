@@ -546,29 +546,26 @@ void DescribeRobotCheck(Command command) {
   command.SetDetails(
       std::string(kRobotHelp) +
       "\n"
-      "Pairs of shapes on one link are never checked. Without --srdf, links connected by a joint,\n"
-      "or by joints through links without shapes, are excluded, too, as in MoveIt: they touch by\n"
-      "design. Planar and floating joints do not count here. With --srdf, exactly the pairs that\n"
-      "it disables are excluded.\n"
+      "Pairs of shapes on the same link are never checked. Without --srdf, links connected by a\n"
+      "joint, or by joints through links without shapes, are excluded, too, as in MoveIt, because\n"
+      "they touch by design. Planar and floating joints do not count here. With --srdf, exactly\n"
+      "the pairs that it disables are excluded.\n"
       "\n"
       "A joint without a value is at 0, or in the middle of its limits if these exclude 0. In\n"
       "--joints, a planar joint J has the columns J/x, J/y and J/theta, a floating one J/trans_x,\n"
       "J/trans_y, J/trans_z, J/rot_x, J/rot_y, J/rot_z and J/rot_w, as in MoveIt. A\n"
-      "value beyond its limits gives a warning. One configuration prints every pair and its\n"
-      "separation. For several waypoints, pairs are printed as they begin (ENTER) and end (LEAVE)\n"
-      "to collide or touch, and the first contact at the end. Only the waypoints are checked, not\n"
-      "the motion between them. A collision is an answer: exit code 0.\n"
+      "value beyond its limits causes a warning. For one configuration, every pair is printed\n"
+      "with its separation. For several waypoints, a pair is printed when it starts (ENTER) and\n"
+      "stops (LEAVE) colliding or touching, and the first contact at the end. Only the waypoints\n"
+      "are checked, not the motion between them. A collision is an answer: exit code 0.\n"
       "\n"
-      "With --continuous, every joint moves linearly from each waypoint to the next. Pairs "
-      "without\n"
-      "a line are free throughout, proven for the path itself, with --clearance by more than "
-      "that.\n"
-      "CONTACT, or NEAR with --clearance: the first time at which the poses of a pair collide or\n"
-      "touch, and the time before it until which the pair is free, as parts of the way between "
-      "the\n"
-      "two waypoints; after it, the pair is not checked. UNDECIDED: a pair comes within "
-      "--resolution\n"
-      "of contact between these waypoints, and no pose was found in contact.");
+      "With --continuous, every joint moves linearly from each waypoint to the next. A pair for\n"
+      "which no line is printed is free throughout, and with --clearance by more than that; this\n"
+      "is proven for the path itself. CONTACT, or NEAR with --clearance: the pair is free until\n"
+      "the first time, and in contact, or within the clearance, at the second one. Both times are\n"
+      "fractions of the way between the two waypoints; the pair is not checked after that.\n"
+      "UNDECIDED: the pair comes within --resolution of contact between these waypoints, but no\n"
+      "pose in contact was found.");
   command.SetExamples(
       {{"All joints at rest", "hullctl robot check arm.urdf --srdf arm.srdf"},
        {"One joint bent", "hullctl robot check arm.urdf --joint elbow_joint=2.5"},
@@ -597,7 +594,7 @@ void AddRobotCheckCommand(Command robot, Invocation* invocation) {
   command
       .AddLength(
           "--resolution",
-          "With --continuous: may leave a pair undecided that comes this close (default 1e-6)",
+          "With --continuous: a pair that comes this close may be left undecided (default 1e-6)",
           [arguments](double length) { arguments->resolution = length; })
       .Needs(continuous);
   AddWantedOptions(command, &arguments->details);

@@ -24,20 +24,16 @@
 namespace hulld {
 
 const char kRobotHelp[] =
-    "FILE is a robot description (URDF). Each collision shape becomes a hull in its own frame: a\n"
-    "mesh its convex hull, a box itself, and a cylinder an enclosing polyhedron whose excess is\n"
-    "printed. A sphere becomes its center and a capsule its segment, both exact with their "
-    "radius.\n"
-    "A mesh file of several named parts that are all convex, as V-HACD and CoACD write them,\n"
-    "becomes one hull per part; --split does so with any parts. Queries carry the hulls, which "
-    "are\n"
-    "not stored unless --prefix keeps them, without radii. A hull of more than 4096 vertices "
-    "needs\n"
-    "--prefix or --local. Meshes are obj, stl, ply, off, gltf, or dae. A package://NAME/ is\n"
-    "searched with --package, in ROS_PACKAGE_PATH and AMENT_PREFIX_PATH, and in the folders above\n"
-    "FILE. Units are meters and radians, as in URDF. Poses are computed in floating point; "
-    "answers\n"
-    "are exact for these poses.\n";
+    "FILE is a robot description (URDF). Each collision shape becomes a hull in its own frame. A\n"
+    "mesh becomes its convex hull, a cylinder an enclosing polyhedron; the distance by which it\n"
+    "exceeds the cylinder is printed. Spheres and capsules are exact: a center or a segment with\n"
+    "a radius. A mesh file of several named parts that are all convex, as V-HACD and CoACD write\n"
+    "them, becomes one hull per part; --split does this with any parts. Queries carry the hulls;\n"
+    "none is stored on the server unless --prefix is given, which stores them without radii. A\n"
+    "hull of more than 4096 vertices needs --prefix or --local. Meshes are obj, stl, ply, off,\n"
+    "gltf, or dae. A package://NAME/ is found through --package, ROS_PACKAGE_PATH, and\n"
+    "AMENT_PREFIX_PATH, and in the folders above FILE. Units are meters and radians, as in URDF.\n"
+    "Poses are computed in floating point; answers are exact for these poses.\n";
 
 namespace {
 

@@ -153,8 +153,8 @@ absl::Status AddHullsAndBodies(const Client& client, const std::string& id_or_pr
 
 namespace {
 
-// Gives the objects at `indices` the hulls of their inline shapes. A hull stands in a file of its
-// own, from which the page receives it.
+// Gives the objects at `indices` the hulls of their inline shapes. Each hull becomes a file of the
+// scene, which the page requests.
 absl::Status AddShapes(const std::vector<size_t>& indices,
                        const std::vector<v1::PointBlock>& shapes, ViewScene* scene) {
   if (shapes.empty()) return absl::OkStatus();

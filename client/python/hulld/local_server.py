@@ -1,4 +1,4 @@
-"""A server for a script or a test that ends with the process."""
+"""A server for a script or a test, which ends with the process."""
 
 from __future__ import annotations
 

@@ -28,10 +28,12 @@ MAX_WAITING = 16
 class HullWatch:
     """An iterator over changes of hulls: first the initial state, then a message with `synced`,
     then changes as they are committed, in the order of their revisions. A slow reader misses
-    intermediate states, but never the last. After a lost connection it resumes where it was.
+    intermediate states, but never the last one. After a lost connection, the watch resumes without
+    repeating events.
 
-    It ends when any thread cancels it; iterating is for one. A context manager, which cancels it.
-    HulldError: the server refuses it, or was not reached again in time. Made by Client.watch_hulls.
+    The iteration ends when any thread calls `cancel`; only one thread may iterate. As a context
+    manager, it cancels the watch. HulldError: the server refuses the watch, or was not reached
+    again in time. Created by Client.watch_hulls.
     """
 
     def __init__(
@@ -53,7 +55,7 @@ class HullWatch:
 
     @property
     def position(self) -> Header | None:
-        """The position to resume at: Client.watch_hulls(..., after=position)."""
+        """The position at which to resume: Client.watch_hulls(..., after=position)."""
         return self._position.after
 
     def __iter__(self) -> Iterator[HullChanges]:
@@ -84,7 +86,7 @@ class HullWatch:
         raise StopIteration
 
     def cancel(self) -> None:
-        """Ends the iteration for good."""
+        """Ends the iteration permanently."""
         self._cancelled = True
         call = self._call
         if call is not None:
@@ -107,15 +109,16 @@ class HullWatch:
 
 
 class CollisionWatch:
-    """An iterator over pairs that begin and end to collide, or to be within a clearance, because
-    their poses change, by `update`, or because their hulls change, which the server detects.
-    Changes between two messages are reported as one event, or as none if they cancel out. After a
-    lost connection it goes on at the current poses: it reports the changes in between, nothing
-    twice, and `synced` once more.
+    """An iterator over pairs that start or stop colliding, or being within a clearance, because
+    their poses change (by `update`) or because their hulls change, which the server detects.
+    Changes of a pair between two messages are reported as one event, or as none if they cancel out.
+    After a lost connection, the watch resumes with the current poses: it reports the changes since
+    then, without repeating events, and sets `synced` again.
 
-    It connects at the first iteration, and ends when it is cancelled. Iterating is for one thread;
-    update and cancel are for any. A context manager, which cancels it. HulldError: the server
-    refuses it, or was not reached again in time. Made by Client.watch_collisions.
+    The watch connects at the first iteration, and ends when it is cancelled. Only one thread may
+    iterate; any thread may call `update` and `cancel`. As a context manager, it cancels the watch.
+    HulldError: the server refuses the watch, or was not reached again in time. Created by
+    Client.watch_collisions.
     """
 
     def __init__(
@@ -181,9 +184,9 @@ class CollisionWatch:
         return self._reported.take(changes, self._updates_before)
 
     def update(self, placements: npt.ArrayLike, poses: PosesLike) -> None:
-        """Moves placements; arguments and ValueError as in CollisionStream.update. The message that
-        takes the update into account has its number in `update`, counted from 1. Without a
-        connection the poses are kept for the next."""
+        """Moves placements; arguments and ValueError are as in CollisionStream.update. Updates are
+        counted from 1, and messages that reflect this update have its number, or a higher one, in
+        `update`. While disconnected, the watch keeps the poses for the next connection."""
         watched = self._watched
         indices, packed = check_update(
             placements, poses, len(watched.placements), watched.orthogonality_tolerance
@@ -194,7 +197,7 @@ class CollisionWatch:
                 self._connection.send(update_stream(indices, packed, False), None)
 
     def cancel(self) -> None:
-        """Ends the iteration for good."""
+        """Ends the iteration permanently."""
         self._cancelled = True
         connection = self._connection
         if connection is not None:

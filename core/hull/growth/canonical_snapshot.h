@@ -13,8 +13,8 @@ namespace hulld {
 
 // Convert the stages of a builder into canonical snapshots: vertices sorted, coplanar triangles
 // merged exactly, facets and edges sorted. Functions with a poll return nullopt if it stopped.
-// Cost: O(V log V), linear if the x of the vertices are spread out, and an exact sign for each pair
-// of neighbors with a common apex.
+// Cost: O(V log V), or O(V) if the x coordinates of the vertices are spread out; and an exact sign
+// for each pair of neighbors with a common apex.
 
 // Requires: at most two vertices, in lexicographic order (unchecked; AuditHull detects violations).
 Hull SnapshotOfEnds(const VertexTable& vertices, std::span<const VertexId> ends);

@@ -15,7 +15,7 @@
 
 namespace hulld {
 
-// Points to be added to a surface, each in the list of a triangle that it sees strictly.
+// Points to be added to a surface, each in the list of a triangle that is strictly visible from it.
 //
 // An insertion adds the point of a list that is farthest from the list's triangle. The points of
 // removed triangles are tested against the new triangles alone, and a point that sees none of them
@@ -29,8 +29,8 @@ class ConflictLists {
     kDone,
     // The poll stopped.
     kStopped,
-    // Points are moved so often, or so many are outside, that another order of insertion is faster;
-    // see TakeRest.
+    // Points are moved between lists so often, or so many are outside, that another order of
+    // insertion is faster; see TakeRest.
     kGaveUp
   };
 
@@ -52,7 +52,8 @@ class ConflictLists {
   std::vector<Vector> TakeRest();
 
  private:
-  // A range of blocks_. The last block is padded with an inside point, which sees nothing.
+  // A range of blocks_. The last block is padded with an inside point, from which no triangle is
+  // visible.
   struct List {
     uint32_t first_block = 0;
     uint32_t count = 0;
@@ -92,7 +93,8 @@ class ConflictLists {
   // Triangles that have had a list, in the order of processing.
   ScratchList<TriangleId> queue_;
   size_t next_in_queue_ = 0;
-  // Numbers of points in lists, of points accepted, and of moves of points.
+  // Number of points in lists, number of accepted points, and number of moves of points between
+  // lists.
   size_t waiting_ = 0;
   size_t taken_ = 0;
   size_t moved_ = 0;

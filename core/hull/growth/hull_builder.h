@@ -20,7 +20,7 @@ struct PointCounts {
   uint64_t received = 0;
   // Points that became vertices and still are after the block.
   uint64_t outside = 0;
-  // Points equal to a vertex of the hull after the block, beyond the first.
+  // Points equal to a vertex that another point accounts for, at the end of the block.
   uint64_t duplicate = 0;
   // Points in the hull after the block that are not vertices of it.
   uint64_t inside = 0;
@@ -81,9 +81,9 @@ class HullBuilder {
   // Memory, by capacities, in bytes. Below 230 bytes per vertex from 1000 vertices on; inside
   // points are not kept. Cost: O(1) from dimension 3 on.
   size_t MemoryBytes() const;
-  // Size of the last Add's journal when it ended, in bytes, beyond MemoryBytes(). At most
-  // proportional to its changes, regardless of the size of the hull; 0 if its limits could not end
-  // it.
+  // Size of the journal at the end of the last Add, in bytes, beyond MemoryBytes(). At most
+  // proportional to the changes of that call, regardless of the size of the hull; 0 if the limits
+  // could not have ended the call.
   size_t undo_bytes() const { return undo_bytes_; }
   // Number of work steps of all insertions, beyond the triangles removed and created. Tests use it
   // to check that no single point stalls.

@@ -13,17 +13,17 @@ namespace hulld {
 // small error. max_error: the caller's length unit; 0: no limit. most: vertices, at least dimension
 // + 1 and at most the hull's. If the poll stopped, the result is meaningless.
 //
-// Chooses farthest first. For a solid, then spreads seven eighths of these vertices more evenly and
-// continues farthest first from there, up to three times while that helps. Returns the best
-// choice, so the result is never worse than farthest first alone. Cost: **observed** two to six
-// times farthest first.
+// Chooses vertices farthest first. For a solid, it then spreads seven eighths of these vertices
+// more evenly and continues farthest first from there, up to three times, as long as this improves
+// the result. Returns the best choice, so the result is never worse than that of farthest first
+// alone. Cost: **observed** two to six times that of farthest first.
 //
-// Vertices are spread by moving all of them together, several times, each to where their hull would
-// have the most volume if the rest stayed: farthest along the sum of the area normals of
-// its facets. This turns the irregular triangles of farthest first into nearly equilateral ones, as
-// far as curvature permits, and these have the least error for their area. Source: Chen and Xu
-// 2004, Optimal Delaunay Triangulations, for the position of maximum volume; Lloyd 1982, Least
-// Squares Quantization in PCM, for moving all at once.
+// The vertices are spread by moving all of them at once, several times. Each moves to the position
+// that would give their hull the largest volume if all others stayed in place: farthest along the
+// sum of the area normals of its facets. This turns the irregular triangles of farthest first into
+// nearly equilateral ones, as far as curvature permits, which have the least error for their area.
+// Source: Chen and Xu 2004, Optimal Delaunay Triangulations, for the position of maximum volume;
+// Lloyd 1982, Least Squares Quantization in PCM, for moving all at once.
 VertexChoice ChooseInside(const Hull& hull, double max_error, size_t most, StopPoll& poll);
 
 }  // namespace hulld

@@ -38,7 +38,7 @@ class PolygonSubset {
   // The vertices strictly between two places of the loop; the second place may be counted beyond
   // the loop's end.
   struct Arc {
-    // Proven bound of the distance of the vertex farthest from the edge; 0 if the arc is empty.
+    // Proven bound on the distance of the vertex farthest from the edge; 0 if the arc is empty.
     double distance;
     size_t farthest;
     size_t first;

@@ -32,13 +32,13 @@ struct SimplifiedHull {
   double error = 0;
 };
 
-// Returns a hull inside the given one. Its vertices are a subset of the given one's, chosen
-// farthest first and then, for a solid, spread more evenly if that gains.
+// Returns a hull inside the given one. Its vertices are a subset of the given hull's, chosen
+// farthest first and then, for a solid, spread more evenly if that improves the result.
 //
-// With max_vertices alone: that many vertices, or all. With max_error: few vertices for an error
-// within it, or as many as max_vertices permits. Errors: INVALID_ARGUMENT: no limit, a max_error
-// that is negative, infinite or NaN, or fewer vertices than needed to preserve the dimension
-// (dimension + 1). CANCELLED: should_stop returned true.
+// With max_vertices alone: that many vertices, or all if there are fewer. With max_error: few
+// vertices for an error of at most max_error, or as many as max_vertices permits. Errors:
+// INVALID_ARGUMENT: no limit, a max_error that is negative, infinite or NaN, or fewer vertices than
+// needed to preserve the dimension (dimension + 1). CANCELLED: should_stop returned true.
 //
 // Guarantee: for a given max_error, at most as many vertices as farthest first needs; for a given
 // max_vertices, at most its error. For smooth bodies, farthest first alone needs vertices within a

@@ -15,9 +15,9 @@ namespace hulld {
 // rounding.
 //
 // From any vertex, edges that lead farther along the direction lead to the farthest vertex of all.
-// Vertices with many edges, such as the tip of a cone, are not climbed from; a tree of boxes over
-// the vertices is searched instead, visiting each box that reaches farther than the best vertex so
-// far.
+// At a vertex with many edges, such as the tip of a cone, the climb stops, and a tree of boxes over
+// the vertices is searched instead: each box that reaches farther than the best vertex so far is
+// visited.
 class SupportFunction {
  public:
   // points: the hull's vertices at unit scale, which must outlive this object. If the poll stopped,
@@ -28,9 +28,9 @@ class SupportFunction {
   // is fast.
   uint32_t FarthestAlong(const Vector& direction, uint32_t start) const;
 
-  // Returns a **proven** bound of the distance of p from the hull; usually within one in 10^9,
-  // except that a bound below `enough` is returned at once. Maintains a triangle of vertices, and
-  // replaces one of them by the support point toward p while that brings the triangle nearer.
+  // Returns a **proven** bound on the distance of p from the hull, usually with a relative error
+  // below 1e-9; but a bound below `enough` is returned at once. Maintains a triangle of vertices,
+  // and replaces one of them with the support point toward p while that brings the triangle nearer.
   // Source: Gilbert, Johnson and Keerthi 1988. Cost: about 5 support points.
   double DistanceBound(const Vector& p, uint32_t start, double enough) const;
 

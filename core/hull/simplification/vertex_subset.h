@@ -18,12 +18,13 @@ namespace hulld {
 // farthest from the hull of the chosen ones.
 //
 // The hull of the chosen vertices grows exactly, like any hull. Each remaining vertex waits in the
-// list of a triangle that it sees strictly; one exists, because each vertex of the full hull is
-// outside the hull of any other vertices. The distance to that triangle bounds the distance to the
-// hull. When triangles are replaced, a vertex of their lists goes to the new triangle with the
-// plane that it is highest above, which is the nearest one if the vertex lies over it. Source:
-// Barber, Dobkin and Huhdanpaa 1996 (Quickhull) for the lists; Kamenev 1992, A Class of Adaptive
-// Algorithms for Approximating Convex Bodies by Polyhedra, for the order and its quality.
+// list of a triangle that is strictly visible from it. Such a triangle exists, because each vertex
+// of the full hull is outside the hull of any other vertices. The distance to that triangle bounds
+// the distance to the hull. When triangles are replaced, a vertex of their lists is moved to the
+// list of the new triangle whose plane it is highest above. That triangle is the nearest one if the
+// vertex lies over it. Source: Barber, Dobkin and Huhdanpaa 1996 (Quickhull) for the lists; Kamenev
+// 1992, A Class of Adaptive Algorithms for Approximating Convex Bodies by Polyhedra, for the order
+// and its quality.
 class VertexSubset {
  public:
   // points: all vertices of a hull of dimension 3; unit_points: the same at unit scale. Both must
@@ -92,7 +93,7 @@ class VertexSubset {
   std::vector<uint32_t> chosen_;
   // By triangle.
   std::vector<Cell> cells_;
-  // By point: a proven bound of its distance, or kChosen. If not chosen: the triangle of its list,
+  // By point: a proven bound on its distance, or kChosen. If not chosen: the triangle of its list,
   // and the next point there.
   std::vector<double> distance_;
   std::vector<TriangleId> triangle_;

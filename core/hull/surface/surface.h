@@ -91,8 +91,9 @@ class Surface {
     Side side;
     TriangleId triangle;
   };
-  // Locates a point; fast if the last point in its cell of the map was near it. Unknown if the walk
-  // exceeds the length expected for the surface. Requires: a known interior point.
+  // Locates a point; fast if the last point located in the same cell of the map was near it.
+  // Unknown if the walk exceeds the length expected for the surface. Requires: a known interior
+  // point.
   Location Locate(const VertexTable& vertices, const Vector& point) {
     HULLD_CHECK(directions_.has_value());
     const size_t cell = directions_->PlaceOf(point).cell;
@@ -132,8 +133,8 @@ class Surface {
   // Returns the insertion steps since the last call, for a poll: one for each insertion, and more
   // for insertions that change many triangles or search many for their place.
   uint64_t TakeSteps() { return std::exchange(steps_, 0); }
-  // Call before many insertions: starts to measure the surface for its present size, if it has
-  // doubled.
+  // Call before many insertions. If the surface has doubled in size since the last measurement,
+  // starts a new one.
   void BeginInsertions(const VertexTable& vertices);
   // Call after insertions by RemoveVisible and JoinToBoundary, which defer housekeeping to this
   // call.
@@ -155,12 +156,12 @@ class Surface {
   bool IsMeasurable() const {
     return directions_ && extent_ >= kTripleProductMin && extent_ <= kTripleProductMax;
   }
-  // Remeasures the surface if the map is worth that for looking up `points` points. If the surface
-  // has changed much since the last measurement, the new map has a center and a frame for its
-  // present shape. fineness: the map has at most this many times as many cells per side as a map
-  // for single points. Returns true if it remeasured; false also if no interior point is known or
-  // the poll stopped, with walks as its steps. Cost: at most `walks_per_point` walks for each
-  // point.
+  // Remeasures the surface if this pays off for looking up `points` points in the map. If the
+  // surface has changed much since the last measurement, the new map has a center and a frame that
+  // fit its present shape. fineness: the map has at most this many times as many cells per side as
+  // a map for single points. Returns true if it remeasured; false also if no interior point is
+  // known or the poll stopped, with walks as its steps. Cost: at most `walks_per_point` walks for
+  // each point.
   bool MeasureBefore(const VertexTable& vertices, size_t points, double fineness,
                      double walks_per_point, StopPoll& poll);
   // False if the map rejected too few of the points looked up since the last measurement.
@@ -265,9 +266,9 @@ class Surface {
   TriangleId NewId();
   void Link(TriangleId a, uint32_t edge_a, TriangleId b, uint32_t edge_b, bool is_flat);
 
-  // Returns, among a triangle and the triangles beyond its edges, the one that the point is
-  // farthest outside; unknown if doubles are not certain that it is outside any. Faster than the
-  // walk steps that it saves.
+  // Returns the triangle that the point is farthest outside of, among a triangle and the triangles
+  // beyond its edges; unknown if doubles do not prove that it is outside any of them. Faster than
+  // the walk steps that it saves.
   Location SeenNear(TriangleId id, const Vector& point, double size) const {
     const SurfaceTriangle& t = triangles_[id];
     TriangleId best = id;
@@ -346,8 +347,8 @@ class Surface {
   // is the vertex; otherwise arbitrary.
   ChunkedVector<uint32_t> place_of_vertex_;
 
-  // Around a point strictly inside, if one is known. The point stays inside while the polytope
-  // grows.
+  // The map around a point strictly inside, if such a point is known. The point stays inside while
+  // the polytope grows.
   std::optional<DirectionMap> directions_;
   std::optional<Measurement> measuring_;
   // Largest distance, by components, of a vertex from that point.

@@ -23,8 +23,8 @@ const char* FindDefect(const Surface& surface, const VertexTable& vertices,
 
 // Checks the triangles created by an insertion like FindDefect. Also checks that each has the new
 // vertex `apex` as its last corner, that they turn about the apex exactly once, in any order, and
-// that the edges opposite to the apex are flat exactly if marked so. Requires: at least one
-// triangle.
+// that the edges opposite to the apex are flat if and only if they are marked so. Requires: at
+// least one triangle.
 const char* FindStarDefect(const Surface& surface, const VertexTable& vertices,
                            std::span<const TriangleId> star, VertexId apex);
 

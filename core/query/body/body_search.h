@@ -47,7 +47,7 @@ struct BodyCounts {
 // of the deepest. Each pair is decided like two hulls, at the exact products of the poses.
 //
 // The search descends two box trees simultaneously, nearest boxes first. If only the relation and
-// the clearance are requested, it stops when both are known, and names the pair that settled the
+// the clearance are requested, it stops when both are known, and names the pair that decided the
 // relation or, if no pair collides, the clearance. While only one of them is unknown, it skips all
 // pairs that cannot change it, so it never visits more boxes and pairs than a search for the
 // separation. If further details are requested, it names the pair with the least separation.

@@ -7,13 +7,13 @@
 
 namespace hulld {
 
-// Lower bounds of the separation of boxes of two bodies, each box in its body's frame and grown by
+// Lower bounds on the separation of boxes of two bodies, each box in its body's frame and grown by
 // the body's radius.
 class BoxGap {
  public:
   BoxGap(const PlacedBody& x, const PlacedBody& y);
 
-  // Returns a **proven** lower bound of the separation of any two hulls in the boxes: the largest
+  // Returns a **proven** lower bound on the separation of any two hulls in the boxes: the largest
   // gap along the axes of both boxes. Negative if all axes show an overlap, because no penetration
   // is deeper than the overlap along any axis. Infinite if a box is empty, minus infinity if no
   // bound is known.

@@ -25,7 +25,7 @@ using ExactCorner = MinkowskiVertex<IntegerVector>;
 // With Q the quaternions' integers and N = |Q|^2, the world coordinates, shifted by -t_A and
 // multiplied by N_A N_B and a power of two, are integers: N_B R(Q_A) P_A for A, and N_A R(Q_B) P_B
 // + N_A N_B (T_B - T_A) for B; or multiplied by N_A alone if N_A = N_B. They have degree 5 in the
-// input; some 280 bits at a common exponent. For a piece of a body, the pose is a product, and R
+// input; about 280 bits at a common exponent. For a piece of a body, the pose is a product, and R
 // and N are products of two factors; N T is still an integer, and the degree is 9. If the
 // floating-point pair is usable, it narrows down the vertices that can be farthest, and only these
 // are multiplied out, in integers of a fixed width if the pair's numbers fit.

@@ -20,7 +20,7 @@ constexpr int kMaxSteps = 128;
 
 using Corner = MinkowskiVertex<PlainVector>;
 
-// Lower bound of the distance from the support along a unit vector.
+// Lower bound on the distance from the support along a unit vector.
 template <typename Pair>
 double LowOf(const Pair& pair, const FloatPair::Support& farthest) {
   return -farthest.value - kReachErrorFactor * pair.size();

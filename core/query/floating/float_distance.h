@@ -21,10 +21,10 @@ SeparationBounds BoundDistance(const FloatPair& pair, const Vector& n,
 // Returns the vector from the point of A - B in `bounds` to the origin; zero if it is unknown.
 Vector TowardOrigin(const FloatPair& pair, const SeparationBounds& bounds);
 
-// Returns a **proven** lower bound of the distance of two hulls, from their gap along n; negative
+// Returns a **proven** lower bound on the distance of two hulls, from their gap along n; negative
 // if n shows no gap. Requires: n not zero, and pair.usable().
 double DistanceAlong(const FloatPair& pair, const Vector& n);
-// Returns a **proven** upper bound of the distance, from the point nearest to the origin of the
+// Returns a **proven** upper bound on the distance, from the point nearest to the origin of the
 // triangle of the differences of three pairs, which may be equal. Requires: pair.usable().
 double DistanceOfTriangle(const FloatPair& pair, const VertexPair* pairs);
 

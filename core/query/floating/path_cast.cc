@@ -20,7 +20,7 @@ constexpr double kOpenShare = 0x1p-40;
 // along their symmetry axis are not a special case. A choice.
 constexpr double kOffCenter = 0x1p-5;
 
-// A lower bound of the gap along a unit direction, at time 0 and changing with time.
+// A lower bound on the gap along a unit direction, at time 0 and changing with time.
 struct Gap {
   double at_start;
   double speed;

@@ -13,7 +13,7 @@
 namespace hulld {
 namespace {
 
-// Returns an upper bound of the distance from a point to any point of a box.
+// Returns an upper bound on the distance from a point to any point of a box.
 double Reach(const Box& box, const Vector& from) {
   const Vector farthest = (box.low - from).cwiseAbs().cwiseMax((box.high - from).cwiseAbs());
   // The differences, squares, sum, and root together have a relative error below 2^-50, or lose

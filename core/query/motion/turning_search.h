@@ -34,10 +34,10 @@ namespace hulld {
 // with linear gaps along the nearest directions at two times, they would be nearest where both gaps
 // are equal. So a miss, however near, needs few planes, and the time of a contact is roughly known.
 //
-// Near a contact, a step first tries to leap to just before the contact that a parabola predicts
-// from the current gap, its rate, and the previous gap. The error of each prediction determines how
-// near to the contact the next leap may end. Leaps converge superlinearly and leave few exact
-// queries. After k consecutive wrong predictions, k steps do not leap.
+// Near a contact, a step first tries to leap to a time just before the contact, which a parabola
+// predicts from the current gap, its rate, and the previous gap. The error of each prediction
+// determines how close to the contact the next leap may end. Leaps converge superlinearly, so few
+// exact queries are needed. After k consecutive wrong predictions, k steps do not leap.
 //
 // Once the gap is within the resolution, planes that the hulls may cross by up to the resolution
 // decide if the minimum separation over the remaining motion is also within it.

@@ -22,7 +22,7 @@
 
 namespace hulld {
 
-// Upper and lower bounds of a hull's extent as seen from its center c, for every direction, without
+// Upper and lower bounds on a hull's extent as seen from its center c, for every direction, without
 // access to its vertices.
 //
 // The upper bound is the support function h(n): the largest n . (v - c). The lower bound is the
@@ -62,10 +62,10 @@ class CenterBounds {
   };
   // The location of a direction among the corners; unknown if there are no corners.
   class Place;
-  // Locates n, and counts as a look at its cell. Requires: n in the range of FloatPair's directions
-  // (IsFilterDirection).
+  // Locates n, and counts as a look at its cell (see Making). Requires: n in the range of
+  // FloatPair's directions (IsFilterDirection).
   Place PlaceOf(const PlainVector& n) const;
-  // Returns upper bounds of h(n) and g(n) for the n of a place, up to errors of the hull's
+  // Returns upper bounds on h(n) and g(n) for the n of a place, up to errors of the hull's
   // coordinates and of n (see kCenterSupportFactor and kCenterGaugeFactor in
   // core/numeric/error_bounds.h).
   Bounds At(const Place& place) const;
@@ -73,7 +73,7 @@ class CenterBounds {
   // Returns the approximate outward normal of the hull at the point where the ray from c along the
   // n of a place leaves it; longer where the hull is narrow. Zero if coarse or unknown.
   PlainVector NormalAt(const Place& place) const;
-  // True if there are few corners or none. The bounds then help only with points deep inside, and
+  // True if there are few corners or none. The bounds then help only for points deep inside, and
   // the normals are useless.
   bool coarse() const { return side_ < kMinFineSide; }
   // At least g(d) for all d with components of at most 1; infinite if unknown. Requires: this

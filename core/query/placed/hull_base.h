@@ -15,7 +15,7 @@
 
 namespace hulld {
 
-// Returns an upper bound of the length of a computed difference of two points. Nearly tight, except
+// Returns an upper bound on the length of a computed difference of two points. Nearly tight, except
 // for differences so small or so large that their squares are not doubles.
 double RadiusTo(const Vector& difference);
 

@@ -23,16 +23,17 @@ namespace hulld {
 // O(1) to create, is immutable, and shares all data with other versions. Points that are no longer
 // extreme are harmless; preparing drops most of them.
 //
-// Queries pay for preparation (ski rental): each counts the points it scanned, and after the scans
-// have cost as much as preparation, WantsPreparing() returns true. The total is at most about twice
-// the optimum in hindsight, and a hull that is never queried is never prepared. Prepare() builds a
-// level from the tail and merges it with levels that are not much larger (Bentley and Saxe 1980,
-// Decomposable searching problems), so that each point is moved O(log n) times.
+// Queries pay for preparation (the ski rental rule): each query counts the points that it scans,
+// and when the scans have cost as much as preparation would, WantsPreparing() returns true. The
+// total is at most about twice the optimum in hindsight, and a hull that is never queried is never
+// prepared. Prepare() builds a level from the tail and merges it with levels that are not much
+// larger (Bentley and Saxe 1980, Decomposable searching problems), so that each point is moved
+// O(log n) times.
 //
 // Thread-safe: one thread appends, one prepares, and any number create versions, concurrently.
 class LiveHull {
  public:
-  // A position in the growth: everything appended up to it. Keeps alive the data of its version.
+  // A position in the growth: the points appended up to it. Keeps the data of its version alive.
   class Mark {
    public:
     // The mark of an empty LiveHull.
@@ -62,9 +63,9 @@ class LiveHull {
   LiveHull(const LiveHull& other, const Mark& mark);
   LiveHull& operator=(const LiveHull&) = delete;
 
-  // Appends the points of a block: at least its points that became vertices, none outside the hull
-  // after it. `dimension`: the hull's after the block. Returns the mark after it. Cost: O(points),
-  // amortized; O(n) if the dimension grew.
+  // Appends the points of a block: at least those that became vertices, and none outside the hull
+  // after the block. `dimension`: that of the hull after the block. Returns the mark after the
+  // block. Cost: O(points), amortized; O(n) if the dimension grew.
   Mark Append(std::span<const Vector> points, int dimension);
   // Returns the mark after the last Append.
   Mark Now() const;

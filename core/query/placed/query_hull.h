@@ -59,7 +59,7 @@ class QueryHull {
   std::span<const Vector> points_together() const {
     return base_ == nullptr || growth_ != nullptr ? std::span<const Vector>() : base_->points();
   }
-  // The blocks of a support map that has all points; empty for large hulls and where
+  // The blocks of a support map that contains all points; empty for large hulls and if
   // points_together() is empty.
   std::span<const SupportBlock> blocks() const {
     return base_ == nullptr || growth_ != nullptr ? std::span<const SupportBlock>()

@@ -55,7 +55,7 @@ class SupportTree {
     uint32_t after;
 
     bool is_leaf() const { return end - first <= kLeafPoints; }
-    // Returns an upper bound of the computed values of its points.
+    // Returns an upper bound on the computed values of its points.
     double ReachAlong(const PlainVector& n) const {
       return SupportValue(n, n.x > 0 ? high.x : low.x, n.y > 0 ? high.y : low.y,
                           n.z > 0 ? high.z : low.z);

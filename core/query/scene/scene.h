@@ -134,14 +134,16 @@ class SceneSearch {
   // Computes the relation, and the comparison with the clearance.
   QueryOptions first_look_;
   std::set<std::pair<uint32_t, uint32_t>> ignored_;
-  // For each placement, the next one, beyond those of its own group if that group ignores itself.
-  // Empty without ignored groups. A search skips subtrees of lower indices.
+  // For each placement, the index of the next one, or of the first one after its own group if pairs
+  // within that group are ignored. Empty if no groups are ignored. A search skips subtrees with
+  // lower indices.
   std::vector<uint32_t> first_others_;
   std::vector<Box> boxes_;
   // Parallel to boxes_, which are around them; empty if all placements are at rest.
   std::vector<MovingBox> moving_;
-  // The boxes from the first candidate of any placement on: a tree of a thousand hulls, without the
-  // rays that precede them. Index 0 of the tree is the placement tree_first_.
+  // The boxes from the first candidate of any placement on. If many rays precede a thousand hulls,
+  // for example, the tree contains only the hulls. Index 0 of the tree is the placement
+  // tree_first_.
   BoxTree tree_{std::span<const Box>()};
   uint32_t tree_first_ = 0;
   uint64_t pairs_ = 0;
@@ -184,7 +186,7 @@ class SceneCandidates {
   MovingBox moving_;
   std::vector<uint32_t> waiting_;
   bool is_gathered_ = false;
-  // A few candidates are listed. Larger sets use a bit for each placement, which also sorts them.
+  // Candidates, if there are few. For larger sets, a bit for each placement, which also sorts them.
   std::vector<uint32_t> listed_;
   std::vector<uint64_t> marked_;
   bool is_marked_ = false;

@@ -14,7 +14,7 @@ namespace hulld {
 // coordinates of the two hulls, each about its center.
 inline constexpr double kDefaultRelativeMaxError = 1e-12;
 
-// The largest bound of the angle of a normal, in radians. Floating point meets it inside facets,
+// The largest bound on the angle of a normal, in radians. Floating point meets it inside facets,
 // and for hulls about as far apart as they are large; otherwise exact arithmetic finds the normal.
 inline constexpr double kMaxNormalAngle = 1e-6;
 
@@ -28,7 +28,7 @@ struct QueryOptions {
   bool want_separation = false;
   bool want_witness = false;
   bool want_normal = false;
-  // The largest acceptable bound of a requested separation, in the caller's length unit. If absent:
+  // The largest acceptable bound on a requested separation, in the caller's length unit. If absent:
   // kDefaultRelativeMaxError times the sizes of the hulls and the separation. If a double cannot
   // represent the value that accurately, the bound is its rounding error.
   std::optional<double> max_error;
@@ -62,8 +62,8 @@ struct QueryOptions {
   // True if an answer names vertices or facets by index, or depends on a hull's canonical snapshot
   // in another way. A version of a LiveHull is then not sufficient.
   bool WantsCanonical() const { return method == Method::kTextbookSat || WantsDetails(); }
-  // True if the search may stop as soon as it knows the relation, the cheapest kind of query. This
-  // is the only place that decides this.
+  // True if the search may stop as soon as it knows the relation, the cheapest kind of query. No
+  // other code decides this.
   bool WantsRelationOnly() const {
     return method == Method::kCertifiedSearch && !WantsDetails() && !clearance.has_value();
   }

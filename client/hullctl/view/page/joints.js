@@ -1,4 +1,4 @@
-// The joints of a robot, and the time line of its trajectory: the configuration between two
+// The joints of a robot, and the timeline of its trajectory: the configuration between two
 // waypoints is interpolated linearly in each joint.
 import {JointPanel} from 'hulld/panels/joint_panel.js';
 import {runsOf} from 'hulld/panels/time_line.js';
@@ -24,7 +24,7 @@ export class Joints {
     this.panel.rebuild();
   }
 
-  // Returns the track of the time line; null if there is no trajectory.
+  // Returns the track of the timeline; null if there is no trajectory.
   track() {
     const {waypoints, contacts} = this.model;
     const last = waypoints.length - 1;

@@ -1,4 +1,4 @@
-// The motions of a scene, over the time t in [0, 1]: the time line, the swept hulls, and the first
+// The motions of a scene, over the time t in [0, 1]: the timeline, the swept hulls, and the first
 // contact of the pair.
 import {SweepView} from 'hulld/drawing/sweep_view.js';
 import {MotionPanel} from 'hulld/panels/motion_panel.js';
@@ -25,7 +25,7 @@ export class Motion {
     this.update();
   }
 
-  // Returns the track of the time line; null if nothing moves.
+  // Returns the track of the timeline; null if nothing moves.
   track() {
     const {model} = this;
     if (model.time === null) return null;

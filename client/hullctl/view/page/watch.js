@@ -62,7 +62,7 @@ export class Watch {
     return this.moments.length > 0 && !this.isOfPairs;
   }
 
-  // Returns the track of the time line; null if nothing changes.
+  // Returns the track of the timeline; null if nothing changes.
   track() {
     const last = this.moments.length - 1;
     if (last < 1) return null;

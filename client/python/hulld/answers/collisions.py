@@ -67,7 +67,7 @@ class AxisKind(IntEnum):
 
 @dataclass(frozen=True)
 class HullVersion:
-    """The version of a hull that an answer was computed from. Empty for an inline shape."""
+    """The version of a hull from which an answer was computed. Empty for an inline shape."""
 
     hull_id: str
     create_revision: int
@@ -92,9 +92,8 @@ class Separation:
     """|value - true separation| <= bound, and the sign of the value agrees with the relation; in
     the caller's length unit.
 
-    value: the distance when positive; minus the penetration depth when negative; 0 exactly when
-    TOUCHING; infinite when a hull is empty. bound: infinite if a double cannot represent the
-    value.
+    value: the distance if positive; minus the penetration depth if negative; 0 if and only if
+    TOUCHING; infinite if a hull is empty. bound: infinite if a double cannot represent the value.
     """
 
     value: float
@@ -248,7 +247,7 @@ class Analysis:
 
 @dataclass(frozen=True)
 class Problem:
-    """Why a placement, or a pair, has no answer. code and reason: as in HulldError."""
+    """The reason why a placement or a pair has no answer. code and reason: as in HulldError."""
 
     code: str
     message: str

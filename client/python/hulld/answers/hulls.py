@@ -17,9 +17,9 @@ from hulld.wire import Unsigned, packed_doubles, packed_varints, read_fields
 
 @dataclass(frozen=True)
 class Header:
-    """The store and the revision that a reply was answered from. Revisions of different stores are
-    unrelated. staleness: seconds; the answer to a read with a Freshness includes at least
-    everything committed that long before the call."""
+    """The store, and its revision that a reply describes. Revisions of different stores are
+    unrelated. staleness: in seconds; the answer to a read with a Freshness includes at least every
+    change committed that long before the call."""
 
     store_id: str
     revision: int
@@ -99,7 +99,8 @@ class ReplacedHull:
 
 @dataclass(frozen=True)
 class Audit:
-    """A check by code independent of the builder; finding: the defect, if not ok."""
+    """The result of a check with code that is independent of the builder; finding: the defect, if
+    not ok."""
 
     ok: bool
     finding: str

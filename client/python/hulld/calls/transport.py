@@ -92,8 +92,8 @@ class Duplex:
     bound, so a thread reads. Not thread-safe, except for `cancel` and `send`."""
 
     def __init__(self, call: Any, metadata: Any, max_waiting: int | None = None) -> None:
-        """max_waiting: maximum number of messages read ahead of `receive`; beyond it, the server
-        waits. None: unbounded, for calls whose requests bound their answers."""
+        """max_waiting: the maximum number of messages read ahead of `receive`; beyond it, the
+        server waits. None: unbounded, for calls whose requests bound their answers."""
         check_process()
         self._outgoing: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self._incoming: queue.SimpleQueue[Any] = queue.SimpleQueue()

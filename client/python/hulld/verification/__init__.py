@@ -1,9 +1,9 @@
-"""Checks certificates by exact arithmetic, from vertices and poses alone.
+"""Checks certificates in exact arithmetic, from vertices and poses alone.
 
-Everything is a rational number (fractions.Fraction), so nothing is rounded: a vertex, a translation
-and the components of a quaternion are doubles, and the rotation of a quaternion q is a matrix of
-integers in these, divided by |q|^2. The server is trusted only for the stored hulls and bodies at
-the revisions named in the answer.
+All numbers are rational (fractions.Fraction), so nothing is rounded: vertices, translations, and
+the components of quaternions are doubles, and the rotation of a quaternion q is a matrix of
+polynomials in its components, divided by |q|^2. The server is trusted only for the stored hulls and
+bodies at the revisions that the answer names.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 class VerificationError(Exception):
     """A certificate does not prove the answer, or cannot be checked. moved: the hull or body has
-    since changed or been deleted; a new answer can be checked."""
+    been changed or deleted since the answer; a new answer can be checked."""
 
     def __init__(self, reason: str, *, moved: bool = False) -> None:
         super().__init__(reason)

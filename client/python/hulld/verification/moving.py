@@ -102,10 +102,10 @@ class MovingPiece:
         return parallel and sum(p * q for p, q in zip(q0, q1)) > 0
 
     def is_below(self, plane: _Plane, begin: float, until: float, may_end: bool) -> bool:
-        """True if n.p + radius |n| < offset for all vertices p over the interval, with |n| replaced
-        by the longer of both ends; if may_end, equality is allowed at its end. |q(t)|^2 times the
-        difference is a polynomial in t of degree 4. It is negative if no Bernstein coefficient is
-        positive and the outer ones are negative."""
+        """True if n.p + radius |n| < offset for all vertices p over the interval, where the longer
+        of the two directions replaces |n|. may_end: allows equality at the end of the interval.
+        |q(t)|^2 times the difference is a polynomial in t of degree 4. It is negative if no
+        Bernstein coefficient is positive and the outer ones are negative."""
         (q0, x0), (q1, x1) = self._parts_at(Fraction(begin)), self._parts_at(Fraction(until))
         (n0, offset0), (n1, offset1) = plane
         forms = rotation_form(q0, q0), rotation_form(q0, q1), rotation_form(q1, q1)
@@ -137,7 +137,7 @@ class MovingPiece:
 
 
 def _gap_sign(n: Point, a: Piece, b: Piece) -> int:
-    """The sign of min n.B - max n.A - r |n|, r the sum of the radii."""
+    """The sign of min n.B - max n.A - r |n|, where r is the sum of the radii."""
     return sign(gap_along(n, a, b), -(a.radius + b.radius), dot(n, n))
 
 

@@ -39,7 +39,8 @@ def pose_parts(pose: PoseLike) -> tuple[Quaternion, Point]:
 
 
 def rotation_form(a: Quaternion, b: Quaternion) -> tuple[tuple[Point, Point, Point], Fraction]:
-    """R(q) times |q|^2, and |q|^2, if both are q; otherwise these as symmetric bilinear forms."""
+    """Returns R(q) |q|^2 and |q|^2 if a = b = q, and otherwise the symmetric bilinear forms of
+    these."""
     ww, xx, yy, zz = (p * q for p, q in zip(a, b))
 
     def twice(i: int, j: int) -> Fraction:
@@ -126,8 +127,8 @@ def surrounds_origin(points: Sequence[Point]) -> bool:
 
 
 def squared_distances(points: Sequence[Point]) -> Iterator[Fraction]:
-    """Squared distances of 0 from points of the convex hull, among them the nearest one if 0 is not
-    inside: of vertices, and of the feet of perpendiculars in edges and triangles."""
+    """Squared distances from 0 to points of the convex hull: the vertices, and the feet of
+    perpendiculars on edges and triangles. If 0 is not inside, the nearest point is among them."""
     for p in points:
         yield dot(p, p)
     for p, q in combinations(points, 2):

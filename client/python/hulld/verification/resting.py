@@ -27,8 +27,8 @@ STRENGTH = {Relation.SEPARATED: 0, Relation.TOUCHING: 1, Relation.OVERLAPPING: 2
 
 
 class Piece:
-    """A rounded hull where it stands; its vertices are moved when they are needed first. radii:
-    their sum is the radius."""
+    """A rounded hull at its pose. Its vertices are transformed on first use. radii: the radius is
+    their sum."""
 
     def __init__(
         self,
@@ -196,7 +196,7 @@ def check_bodies(
 def check_deciding(
     relation: Relation, shown: Sequence[PieceCertificate], deciding: tuple[int, ...]
 ) -> None:
-    """Checks that the pieces which the answer names are among those shown to be in contact."""
+    """Checks that the pieces that the answer names are among those shown to be in contact."""
     if relation == Relation.SEPARATED or deciding in [(one.piece_a, one.piece_b) for one in shown]:
         return
     raise VerificationError(

@@ -1,4 +1,4 @@
-"""Fetches what an answer is about, and checks its certificate."""
+"""Fetches the hulls and bodies of an answer, and checks its certificate."""
 
 from __future__ import annotations
 
@@ -53,9 +53,9 @@ class _Source(Protocol):
 
 
 class Verifier:
-    """Checks answers with certificates against hulls and bodies, which a client fetches and keeps.
-    Cost: about 0.2 milliseconds for each vertex of each hull or piece that is placed, and some
-    microseconds for each pair of pieces."""
+    """Checks answers with certificates against hulls and bodies, which it fetches through a client
+    and caches. Cost: about 0.2 milliseconds for each vertex of each hull or piece in an answer, and
+    a few microseconds for each pair of pieces."""
 
     def __init__(self, client: _Source) -> None:
         self._client = client
@@ -75,8 +75,8 @@ class Verifier:
         orthogonality_tolerance: float = ORTHOGONALITY_TOLERANCE,
     ) -> None:
         """Checks that the certificate of check_collision(a, b, certificate=True) proves its
-        relation; of a motion, also when the pair meets first, within max_time_error.
-        VerificationError: it does not, or cannot be checked."""
+        relation and, for a motion, the first contact within max_time_error. VerificationError: it
+        does not, or cannot be checked."""
         pair = Placements.of(
             [as_moving(a, to_a), as_moving(b, to_b)],
             orthogonality_tolerance=orthogonality_tolerance,
@@ -106,8 +106,8 @@ class Verifier:
         max_time_error: float = DEFAULT_MAX_TIME_ERROR,
         orthogonality_tolerance: float = ORTHOGONALITY_TOLERANCE,
     ) -> None:
-        """Checks row `row` of a batch, a scene, or a step of a stream about these placements with
-        certificate=True."""
+        """Checks row `row` of a batch, a scene, or a step of a stream that was requested for these
+        placements with certificate=True."""
         packed = Placements.of(placements, orthogonality_tolerance=orthogonality_tolerance)
         a, b = (packed[int(index)] for index in found.pairs[row])
         answers = found.answers

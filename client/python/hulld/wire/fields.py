@@ -1,11 +1,11 @@
-"""Writes and reads the fields of a protobuf message with numpy arrays.
+"""Writes and reads the fields of a protobuf message as numpy arrays.
 
-python-protobuf takes and gives arrays number by number, some 50 ns each. A packed field is the
-array's own bytes behind a tag and a length, so this module writes numpy's buffer there, and reads
-it from there. Small messages are left to protobuf; their bytes can be embedded here, and the other
-way round.
+python-protobuf converts arrays number by number, at about 50 ns each. A packed field is a tag, a
+length, and the bytes of the array, so this module writes and reads these bytes directly from
+numpy's buffer. Small messages are left to protobuf; a serialized message can be embedded in a
+MessageWriter, and the other way round.
 
-Source: Protocol Buffers, "Encoding". A test compares both directions with protobuf's own.
+Source: Protocol Buffers, "Encoding". A test compares both directions with protobuf's own encoding.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class WireError(ValueError):
 
 
 def encode_varint(value: int) -> bytes:
-    """0 <= value < 2^64, in groups of seven bits, the lowest first."""
+    """Encodes a number, 0 <= value < 2^64, in groups of seven bits, the lowest first."""
     out = bytearray()
     while value > 0x7F:
         out.append(value & 0x7F | 0x80)
@@ -37,8 +37,8 @@ def encode_varint(value: int) -> bytes:
 
 
 def encode_varints(values: npt.NDArray[np.uint32]) -> npt.NDArray[np.uint8]:
-    """The varints of all values, one behind the other: canonical, as protobuf writes them. Cost:
-    some ns each."""
+    """The concatenated varints of all values, in the canonical encoding that protobuf writes. Cost:
+    a few ns each."""
     flat = np.ascontiguousarray(values, np.uint32).reshape(-1)
     size = max(1, -(-int(flat.max(initial=0)).bit_length() // 7))
     if size == 1:
@@ -56,8 +56,8 @@ def encode_varints(values: npt.NDArray[np.uint32]) -> npt.NDArray[np.uint8]:
 
 
 class MessageWriter:
-    """A message put together from its fields, in the order of the calls. Empty arrays are left out,
-    as proto3 does."""
+    """Assembles a message from its fields, in the order of the calls. Empty arrays are omitted, as
+    in proto3."""
 
     def __init__(self) -> None:
         self._parts: list[bytes | memoryview] = []
@@ -68,7 +68,7 @@ class MessageWriter:
         self.size += len(part)
 
     def raw(self, serialized: bytes) -> MessageWriter:
-        """Fields that are encoded already, as by SerializeToString."""
+        """Adds fields that are already encoded, for example by SerializeToString."""
         self._put(serialized)
         return self
 
@@ -125,10 +125,10 @@ def _read_varint(data: memoryview, at: int) -> tuple[int, int]:
 
 
 def read_fields(data: bytes | memoryview) -> Iterator[tuple[int, int, Value]]:
-    """Number, wire type, and value of each field, in order. A value with a length is a view of
-    `data`.
+    """Yields the number, wire type, and value of each field, in order. A value with a length is a
+    view of `data`.
 
-    WireError: the bytes are cut off, or no message.
+    WireError: the bytes are truncated, or are not a message.
     """
     view = memoryview(data)
     at = 0
@@ -175,7 +175,7 @@ def packed_floats(value: Value) -> npt.NDArray[np.float32]:
 
 def packed_varints(value: Value) -> Unsigned:
     """The numbers of a field of repeated integers, enums, or bools, packed or a single entry: as
-    uint8, and without a copy, if all are below 128, else as uint64. Cost: some ns each."""
+    uint8, and without a copy, if all are below 128, else as uint64. Cost: a few ns each."""
     if isinstance(value, int):
         return np.array([value], np.uint64)
     data = np.frombuffer(value, np.uint8)

@@ -16,7 +16,7 @@ export function bindKeys(actions) {
     [['R'], '', 'handles that turn', () => actions.mode('rotate')],
     [['X', 'Y', 'Z'], ' ', 'move the object a step along an axis; with Shift back', null],
     [['Backspace'], '', 'put the object back where it was', actions.reset],
-    [['.'], '', 'play the time line', actions.play],
+    [['.'], '', 'play the timeline', actions.play],
     [[','], '', 'go to the first contact of a motion', actions.contact],
     [['U'], '', 'undo the last motion; also Ctrl+Z', actions.undo],
     [['\u2190', '\u2191', '\u2193', '\u2192'], ' ', 'orbit; with Shift pan', null],

@@ -6,7 +6,7 @@ import {ProofLine} from 'hulld/panels/proof_line.js';
 import {poseText} from 'hulld/pose.js';
 import {bodiesMotionProblem, motionProblem} from 'hulld/proof/motion_certificate.js';
 
-const LEGEND = 'The swept shapes are hulls of sampled positions: a picture, not a proof. ' +
+const LEGEND = 'The swept shapes are hulls of sampled positions: an illustration, not a proof. ' +
     'The certificate proves the times.';
 // Coefficients of the polynomial of a vertex.
 const STEPS_PER_INTERVAL = 5;

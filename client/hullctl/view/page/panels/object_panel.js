@@ -123,7 +123,7 @@ export class ObjectPanel {
         'button', {
           type: 'button',
           id,
-          title: 'Copies the placement, every number exact',
+          title: 'Copies the placement with exact numbers',
           onclick: async ({target}) => {
             await copy(text());
             target.textContent = 'Copied';
@@ -263,7 +263,7 @@ export class ObjectPanel {
       id: 'edit-points',
       rows: 3,
       spellcheck: false,
-      placeholder: 'x y z, one point a line',
+      placeholder: 'x y z, one point per line',
       'aria-label': `Points to append to ${object.hullId}`,
     });
     const append = element(
@@ -276,7 +276,7 @@ export class ObjectPanel {
         this.edit({action: 'delete', hullId: object.hullId, points: []});
       } else {
         remove.dataset.sure = 'yes';
-        remove.textContent = `Really delete ${object.hullId}, for everyone`;
+        remove.textContent = `Really delete ${object.hullId} for everyone`;
       }
     });
     remove.addEventListener('blur', () => {

@@ -1,4 +1,4 @@
-// A time line under the picture: a slider with marks, and a button that plays it. A track defines
+// A timeline under the picture: a slider with marks, and a button that plays it. A track defines
 // its meaning.
 
 // Merges ascending moments into runs [first, last].
