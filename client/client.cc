@@ -98,7 +98,7 @@ absl::StatusOr<Response> ListAll(const std::string& prefix, uint64_t limit,
     *all.mutable_header() = page->header();
     items(all)->MergeFrom(*items(*page));
     if (!page->next_page_token().empty() && page->next_page_token() == request.page_token()) {
-      return absl::InternalError("the server returned a page token that repeats itself");
+      return absl::InternalError("the server returned the same page token twice");
     }
     all.set_next_page_token(page->next_page_token());
     // Otherwise a later page could come from an older snapshot and lack items.

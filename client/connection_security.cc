@@ -81,7 +81,7 @@ absl::Status ValidateSecurity(const ConnectionSecurity& security, const std::str
     return absl::InvalidArgumentError("the token contains spaces or control characters");
   }
   if (MaySendToken(security, server)) return absl::OkStatus();
-  return absl::InvalidArgumentError(absl::StrCat("the token would travel unencrypted to ", server,
+  return absl::InvalidArgumentError(absl::StrCat("the token would be sent unencrypted to ", server,
                                                  "; use TLS (--tls), or allow it with --insecure"));
 }
 

@@ -56,12 +56,12 @@ absl::Status ValidateList(const std::string& server) {
     if (kind == HostKind::kName) {
       return absl::InvalidArgumentError(
           absl::StrCat("\"", HostOf(one),
-                       "\" is a name, and a list takes IP addresses; several servers may also have "
-                       "one name in DNS, as in dns:///hulls.example:50551"));
+                       "\" is a name, but a list must contain IP addresses; alternatively, give "
+                       "several servers one DNS name, as in dns:///hulls.example:50551"));
     }
     if (kind != KindOf(HostOf(servers.front()))) {
       return absl::InvalidArgumentError(
-          absl::StrCat("\"", server, "\" lists addresses of IPv4 and of IPv6; use one kind"));
+          absl::StrCat("\"", server, "\" lists IPv4 and IPv6 addresses; use one kind"));
     }
   }
   return absl::OkStatus();

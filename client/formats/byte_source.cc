@@ -137,7 +137,7 @@ bool ByteSource::ReadLine(std::string_view* line) {
   for (const auto& [byte, name] : {std::pair('\0', "NUL"), std::pair('\x1A', "^Z")}) {
     if (line->find(byte) == std::string_view::npos) continue;
     status_ = ErrorAtLine(absl::StrCat("the line contains the byte ", static_cast<int>(byte), " (",
-                                       name, "); is the file text, and undamaged?"));
+                                       name, "); is it an undamaged text file?"));
     return false;
   }
   return true;

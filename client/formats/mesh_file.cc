@@ -221,7 +221,7 @@ absl::StatusOr<std::vector<MeshPart>> ReadParts(const std::string& path, SplitBy
   }
   std::erase_if(parts, [](const MeshPart& part) { return part.mesh.triangles.empty(); });
   if (!parts.empty()) return parts;
-  return absl::InvalidArgumentError(absl::StrCat(path, ": it contains no triangle"));
+  return absl::InvalidArgumentError(absl::StrCat(path, ": contains no triangles"));
 }
 
 absl::Status ReadOffMesh(ByteSource* source, TriangleMesh* mesh) {

@@ -83,7 +83,7 @@ absl::Status ParseElement(const ByteSource& source, std::string_view rest, PlyHe
   const std::string_view count = NextToken(&rest);
   if (!ParseUnsigned(count, &element.count)) {
     return source.ErrorAtLine(
-        absl::StrCat(Quoted(count), " is not a number of elements ", Quoted(element.name)));
+        absl::StrCat(Quoted(count), " is not a count of elements ", Quoted(element.name)));
   }
   header->elements.push_back(std::move(element));
   return absl::OkStatus();
@@ -100,7 +100,7 @@ absl::Status ParseProperty(const ByteSource& source, std::string_view rest, PlyH
     if (!property.count_type || *property.count_type == ScalarType::kFloat ||
         *property.count_type == ScalarType::kDouble) {
       return source.ErrorAtLine(
-          absl::StrCat(Quoted(count_name), " is not a valid type of a list's count"));
+          absl::StrCat(Quoted(count_name), " is not a valid type for the count of a list"));
     }
     type_name = NextToken(&rest);
   }

@@ -54,7 +54,7 @@ absl::Status ReadText(const ReadRequest& request, PointCollector* points) {
     case PointFormat::kDae:
       return ReadDae(source->get(), points);
   }
-  return absl::InternalError("an unknown format");
+  return absl::InternalError("unknown format");
 }
 
 }  // namespace

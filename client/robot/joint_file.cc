@@ -51,8 +51,9 @@ absl::StatusOr<int> PlaceOf(const Robot& robot, const std::vector<JointVariable>
   if (variable != variables.end()) return static_cast<int>(variable - variables.begin());
   const int joint = robot.FindJoint(name);
   if (joint < 0) {
-    return absl::InvalidArgumentError(absl::StrCat(
-        Quoted(name), " is not a joint of the robot; joints with values: ", NamesOf(variables)));
+    return absl::InvalidArgumentError(
+        absl::StrCat(Quoted(name),
+                     " is not a joint of the robot; joints that can be set: ", NamesOf(variables)));
   }
   const RobotJoint& found = robot.joints[static_cast<size_t>(joint)];
   if (found.mimics >= 0) {
@@ -134,8 +135,9 @@ absl::StatusOr<bool> WaypointReader::Next(std::vector<double>* free_values) {
     const std::vector<std::string_view> cells = CellsOf(line);
     if (cells.empty()) continue;
     if (cells.size() != columns_.size()) {
-      return source_->ErrorAtLine(absl::StrCat(
-          "the header has ", Counted(columns_.size(), "column"), ", this row ", cells.size()));
+      return source_->ErrorAtLine(absl::StrCat("the header has ",
+                                               Counted(columns_.size(), "column"),
+                                               ", but this row has ", cells.size()));
     }
     *free_values = rest_;
     for (size_t i = 0; i < cells.size(); ++i) {

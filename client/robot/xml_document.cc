@@ -32,7 +32,7 @@ class TagWalk {
       return Error(absl::StrCat("the file ends before </", open_.back().name, ">, which closes <",
                                 open_.back().name, "> of line ", open_.back().line));
     }
-    return roots_ == 1 ? absl::OkStatus() : Error("it contains no element");
+    return roots_ == 1 ? absl::OkStatus() : Error("the file contains no element");
   }
 
  private:
@@ -186,7 +186,7 @@ absl::StatusOr<std::unique_ptr<XmlDocument>> ParseXml(const std::string& text,
   }
   const TiXmlElement* const element = document->tree.RootElement();
   if (element == nullptr) {
-    return absl::InvalidArgumentError(absl::StrCat(name, ": it contains no element"));
+    return absl::InvalidArgumentError(absl::StrCat(name, ": contains no element"));
   }
   if (element->ValueStr() != root) {
     return document->ErrorAt(*element, absl::StrCat("the outermost element is <",

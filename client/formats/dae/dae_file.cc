@@ -117,7 +117,7 @@ class DaeWalk {
     if (!ok()) return;
     if (level > kMaxLevels) {
       return Fail(node, absl::StrCat("is nested deeper than ", kMaxLevels,
-                                     " levels; does it show itself?"));
+                                     " levels; does it instantiate itself?"));
     }
     const size_t number = ++number_;
     Affine X_WN = X_WP;
@@ -126,7 +126,7 @@ class DaeWalk {
     }
     for (const xml_node child : node.children()) {
       if (++elements_ > kMaxElements) {
-        Fail(node, absl::StrCat("is shown too often, with others: more than ", kMaxElements,
+        Fail(node, absl::StrCat("is instantiated too often: the scene has more than ", kMaxElements,
                                 " elements"));
       }
       if (!ok()) return;
@@ -155,7 +155,7 @@ class DaeWalk {
     vertices_ += mesh.vertices.size();
     corners_ += mesh.vertices.size() + 3 * mesh.triangles.size();
     if (corners_ > kMaxCorners) {
-      Fail(node, absl::StrCat("is shown too often, with others: more than ", kMaxCorners,
+      Fail(node, absl::StrCat("is instantiated too often: the scene has more than ", kMaxCorners,
                               " vertices and corners of triangles"));
     }
     if (!ok()) return;

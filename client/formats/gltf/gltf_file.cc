@@ -119,7 +119,7 @@ class GltfWalk {
       }
     }
     for (size_t i = 0; i < vertices.size() && ok(); ++i) {
-      if (totals[i] == 0) Fail(absl::StrCat("vertex ", i, " has no weight of a joint"));
+      if (totals[i] == 0) Fail(absl::StrCat("vertex ", i, " has no joint weight"));
       // Rounding makes the sum of the weights inexact.
       for (size_t axis = 0; axis < 3; ++axis) vertices[i][axis] = sums[i][axis] / totals[i];
     }

@@ -25,7 +25,7 @@ absl::Status ValidatePose(const Pose& pose) {
   for (int i = 0; i < 3; ++i) {
     if (absl::Status s = CheckFinite("translation", kTranslation[i], pose.t[i]); !s.ok()) return s;
   }
-  return absl::InvalidArgumentError("rotation is zero; any other finite quaternion is a rotation");
+  return absl::InvalidArgumentError("rotation is zero; use w = 1, x = y = z = 0 for no rotation");
 }
 
 }  // namespace hulld

@@ -58,7 +58,7 @@ TEST(MeshParts, AFileWithoutTrianglesIsRefused) {
   const TempFile file("a.obj", "v 0 0 0\n");
   for (const SplitBy split : {SplitBy::kName, SplitBy::kComponent}) {
     EXPECT_THAT(ReadParts(file.path(), split).status().ToString(),
-                HasSubstr("it contains no triangle"));
+                HasSubstr("contains no triangles"));
   }
   const TempFile points("a.xyz", "0 0 0\n");
   EXPECT_FALSE(ReadParts(points.path(), SplitBy::kName).ok());

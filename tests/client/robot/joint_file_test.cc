@@ -76,7 +76,8 @@ TEST_F(JointFile, ErrorsNameTheLine) {
   EXPECT_THAT(Read("follow\n1\n"), HasSubstr(":1: \"follow\" follows shoulder; leave it out"));
   EXPECT_THAT(Read("bolt\n1\n"), HasSubstr(":1: \"bolt\" is fixed"));
   EXPECT_THAT(Read("elbow,elbow\n"), HasSubstr(":1: \"elbow\" has two columns"));
-  EXPECT_THAT(Read("elbow\n1\n1,2\n"), HasSubstr(":3: the header has 1 column, this row 2"));
+  EXPECT_THAT(Read("elbow\n1\n1,2\n"),
+              HasSubstr(":3: the header has 1 column, but this row has 2"));
   EXPECT_THAT(Read("elbow\nx\n"), HasSubstr(":2: \"x\" is not a number"));
   EXPECT_THAT(Read("elbow\ninf\n"), HasSubstr(":2: \"inf\" is not a finite number"));
   EXPECT_THAT(Read("time\n1\n"), HasSubstr("no header with joint names"));

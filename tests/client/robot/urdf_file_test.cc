@@ -143,7 +143,7 @@ TEST(UrdfFile, ErrorsNameLineAndElement) {
     EXPECT_THAT(message, StartsWith("arm.urdf:"));
     EXPECT_THAT(message, HasSubstr(error));
   }
-  EXPECT_THAT(ErrorOf(""), HasSubstr("it contains no element"));
+  EXPECT_THAT(ErrorOf(""), HasSubstr("contains no element"));
   EXPECT_THAT(ErrorOf("<sdf/>"), HasSubstr("the outermost element is <sdf>, not <robot>"));
   EXPECT_THAT(ErrorOf(std::string("<robot name=\"\0\"/>", 17)), HasSubstr("a zero byte"));
   std::string deep;

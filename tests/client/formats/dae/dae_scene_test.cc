@@ -192,11 +192,12 @@ TEST(DaeScene, WhatIsNotReadIsRefusedByName) {
 }
 
 TEST(DaeScene, NodesThatShowThemselvesAreRefused) {
-  EXPECT_THAT(Error(Scene("<node id='a'><instance_node url='#a'/></node>")),
-              HasSubstr("FILE:15: <node> is nested deeper than 256 levels; does it show itself?"));
+  EXPECT_THAT(
+      Error(Scene("<node id='a'><instance_node url='#a'/></node>")),
+      HasSubstr("FILE:15: <node> is nested deeper than 256 levels; does it instantiate itself?"));
   EXPECT_THAT(Error(Scene("<node id='a'><node><instance_node url='#b'/></node></node>"
                           "<node id='b'><instance_node url='#a'/></node>")),
-              HasSubstr("does it show itself?"));
+              HasSubstr("does it instantiate itself?"));
 }
 
 // 2^30 nodes in a file of 2 KB.
@@ -207,7 +208,7 @@ TEST(DaeScene, NodesThatMultiplyAreRefused) {
     absl::StrAppend(&nodes, "<node id='n", i, "'>", next, next, "</node>\n");
   }
   EXPECT_THAT(Error(Scene(nodes + "<node id='n30'/>")),
-              HasSubstr("is shown too often, with others: more than 1048576 elements"));
+              HasSubstr("is instantiated too often: the scene has more than 1048576 elements"));
 }
 
 // 100,000 triangles, 1,000 times.
@@ -219,7 +220,7 @@ TEST(DaeScene, TrianglesThatMultiplyAreRefused) {
   std::string text = DaeReplaced(Scene(nodes + "</node>"), "0 1 2", indices);
   text = DaeReplaced(text, "<triangles count=\"1\">", "<triangles>");
   EXPECT_THAT(Error(text),
-              HasSubstr("too often, with others: more than 268435456 vertices and corners"));
+              HasSubstr("too often: the scene has more than 268435456 vertices and corners"));
 }
 
 // The parser does not recurse.
