@@ -186,7 +186,7 @@ class Appender:
         try:
             self._connection.send(request, self._timeout)
         except TimeoutError:
-            raise self._fail(self._late("took")) from None
+            raise self._fail(self._late("accepted")) from None
 
     def _take_one(self) -> None:
         """Takes one acknowledgement, or reconnects."""

@@ -68,7 +68,7 @@ class Connection:
             raise ValueError("the token is empty, or contains spaces or non-ASCII characters")
         if self.tls is None and not self.insecure and not is_loopback(self.server):
             raise ValueError(
-                f"the token would travel unencrypted to {self.server}; use tls=hulld.Tls(), or "
+                f"the token would be sent unencrypted to {self.server}; use tls=hulld.Tls(), or "
                 "allow it with insecure=True"
             )
 
@@ -159,7 +159,7 @@ def _ip_version(servers: str) -> int:
             )
         versions.add(address.version)
     if len(versions) > 1:
-        raise ValueError(f"{servers!r} lists addresses of IPv4 and of IPv6; use one kind")
+        raise ValueError(f"{servers!r} lists IPv4 and IPv6 addresses; use one kind")
     return versions.pop()
 
 

@@ -181,7 +181,8 @@ def _read(path: str | os.PathLike[str]) -> dict[str, Any]:
     for number, row in enumerate(rows[1:]):
         if len(row) != len(header):
             raise ValueError(
-                f"{os.fspath(path)}: row {number} has {len(row)} cells, the header {len(header)}"
+                f"{os.fspath(path)}: row {number} has {len(row)} cells, but the header has "
+                f"{len(header)}"
             )
     cells = {name: [row[index] for row in rows[1:]] for index, name in enumerate(header)}
     columns: dict[str, Any] = {name: cells[name] for name in ("a", "b", *_ANSWERS) if name in cells}
@@ -205,7 +206,7 @@ def _read_poses(
     """Sets the numbers of poses that have a column."""
     given = [cell for cell in _CELLS[:4] if f"{prefix}_{cell}" in cells]
     if len(given) not in (0, 4):
-        raise ValueError(f"{path}: a quaternion has four columns, from {prefix}_qw on")
+        raise ValueError(f"{path}: a quaternion has four columns, starting with {prefix}_qw")
     for index, cell in enumerate(_CELLS):
         name = f"{prefix}_{cell}"
         if name in cells:
@@ -222,12 +223,12 @@ def _as_table(columns: Mapping[str, Any], orthogonality_tolerance: float) -> _Ta
             raise ValueError(f"the table needs the column {name!r}, the IDs or names of hulls")
     if not any(name in columns for name in _ANSWERS):
         raise ValueError(
-            f"the table needs an answer: {', '.join(_ANSWERS[:-1])}, or {_ANSWERS[-1]}"
+            f"the table needs a column of answers: {', '.join(_ANSWERS[:-1])}, or {_ANSWERS[-1]}"
         )
     count = len(columns["a"])
     for name, column in columns.items():
         if column is not None and len(column) != count:
-            raise ValueError(f"{name} has {len(column)} rows, a {count}")
+            raise ValueError(f"{name} has {len(column)} rows, but a has {count}")
     identities = np.tile([1.0, 0, 0, 0, 0, 0, 0], (count, 1))
 
     def poses(name: str, default: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
@@ -295,7 +296,7 @@ def _relations(values: Any, count: int) -> npt.NDArray[np.uint8]:
             known = int(value) if value in (0, 1, 2, 3) else None
         if known is None:
             raise ValueError(
-                f"relation[{row}] is {value!r}; it is SEPARATED, TOUCHING, or OVERLAPPING"
+                f"relation[{row}] is {value!r}; it must be SEPARATED, TOUCHING, or OVERLAPPING"
             )
         relations[row] = known
     return relations
@@ -308,7 +309,7 @@ def _booleans(values: Any, count: int) -> npt.NDArray[np.float64]:
         if word in ("1", "true", "1.0", "0", "false", "0.0"):
             booleans[row] = word[0] in "1t"
         elif word not in ("", "nan", "none"):
-            raise ValueError(f"colliding[{row}] is {value!r}; it is 0, 1, true, or false")
+            raise ValueError(f"colliding[{row}] is {value!r}; it must be 0, 1, true, or false")
     return booleans
 
 

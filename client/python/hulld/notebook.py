@@ -149,7 +149,8 @@ def _frame_of(page: str) -> str:
     recording, end, after = rest.partition(_END)
     if not end:
         raise ValueError(
-            "this hullctl writes pages in a different format; use the hullctl of the same version"
+            "this hullctl writes pages in a different format; use a hullctl of the package's "
+            "version"
         )
     shell = gzip.compress((before + start + _MARK + end + after).encode(), mtime=0)
     key = hashlib.blake2b(shell, digest_size=8).hexdigest()

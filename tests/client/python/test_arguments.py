@@ -200,7 +200,7 @@ def test_matrices_of_floats_pass_with_a_tolerance(either: Any, name: str) -> Non
     either.append_points(name, CUBE, create=True)
     X = hulld.Pose((0.3, -0.7, 0.2, 0.9), (3, 0, 0)).matrix().astype(np.float32)
     pair, tolerance = [name, (name, X)], {"orthogonality_tolerance": 1e-6}
-    with pytest.raises(ValueError, match=r"poses\[1\].*off the identity by .*e-0\d,") as refused:
+    with pytest.raises(ValueError, match=r"poses\[1\].*from the identity by .*e-0\d,") as refused:
         either.check_collisions(pair)
     assert "orthogonality_tolerance=1e-0" in str(refused.value)
     answer = either.check_collision(*pair, certificate=True, **tolerance)

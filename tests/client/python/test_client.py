@@ -467,7 +467,7 @@ def test_a_stream_answers_what_moved(either: Any, name: str) -> None:
         # Equal poses, different hulls.
         assert stream.update([1], [(0.5, 0, 0)]).answers.relations[0] == 3
         assert stream.refresh().answers.relations[0] == 1
-        with pytest.raises(ValueError, match=r"placements\[0\] is 3; there are 3"):
+        with pytest.raises(ValueError, match=r"placements\[0\] is 3; indices start at 0"):
             stream.update([3], [(0, 0, 0)])
         with pytest.raises(ValueError, match="2 poses for 1"):
             stream.update([0], np.zeros((2, 3)))

@@ -96,7 +96,7 @@ def test_bodies_are_proven(client: hulld.Client, row: str, cube: str) -> None:
     with pytest.raises(hulld.VerificationError, match="pieces 9 of A .* no certificate shows"):
         verifier.check(row, (row, (0, 1, 0)), other)
     wrong = dataclasses.replace(touching, relation=hulld.Relation.SEPARATED)
-    with pytest.raises(hulld.VerificationError, match="are TOUCHING, the bodies SEPARATED"):
+    with pytest.raises(hulld.VerificationError, match="are TOUCHING, but the bodies are SEPARATED"):
         verifier.check(row, (row, (0, 1, 0)), wrong)
 
 

@@ -75,7 +75,7 @@ def check_process() -> None:
     if _is_forked:
         raise FailedPreconditionError(
             f"process {os.getpid()} was forked while its parent had an open hulld client, which "
-            'gRPC does not support; start processes by multiprocessing\'s "spawn" or '
+            'gRPC does not support; start processes with multiprocessing\'s "spawn" or '
             '"forkserver" method, or close every client before the fork'
         )
 

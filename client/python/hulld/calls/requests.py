@@ -116,14 +116,14 @@ def get_hull_mesh(
         )
     if side is not None:
         if side not in ("inside", "outside"):
-            raise ValueError(f'side is {side!r}; it is "inside" or "outside"')
+            raise ValueError(f'side is {side!r}; it must be "inside" or "outside"')
         request.simplification.side = (
             hull_pb2.SIMPLIFICATION_SIDE_INSIDE
             if side == "inside"
             else hull_pb2.SIMPLIFICATION_SIDE_OUTSIDE
         )
         if max_vertices is None and max_error is None:
-            raise ValueError("side needs max_vertices or max_error")
+            raise ValueError("side requires max_vertices or max_error")
         request.simplification.max_vertices = (
             arguments.optional_count(max_vertices, "max_vertices", least=1) or 0
         )
@@ -149,7 +149,7 @@ def list_hulls(prefix: str, page_size: int, page_token: str) -> Call[HullPage]:
     def decode(data: bytes) -> HullPage:
         message = hull_pb2.ListHullsResponse.FromString(data)
         if message.next_page_token and message.next_page_token == page_token:
-            raise ValueError("the server returned a page token that repeats itself")
+            raise ValueError("the server returned the same page token twice")
         return HullPage(
             [hulls.info_of(hull) for hull in message.hulls],
             message.next_page_token,
@@ -227,7 +227,7 @@ def list_bodies(prefix: str, page_size: int, page_token: str) -> Call[BodyPage]:
     def decode(data: bytes) -> BodyPage:
         page = bodies.decode_page(data)
         if page.next_page and page.next_page == page_token:
-            raise ValueError("the server returned a page token that repeats itself")
+            raise ValueError("the server returned the same page token twice")
         return page
 
     request = body_pb2.ListBodiesRequest(
@@ -335,7 +335,8 @@ class SceneFilter:
             groups = _group_numbers(self.groups, "groups")
             if groups.shape != (placements,):
                 raise ValueError(
-                    f"groups has the shape {groups.shape}; there are {placements} placements"
+                    f"groups has the shape {groups.shape}; expected one group for each of "
+                    f"{placements} placements"
                 )
             message.groups.extend(groups.tolist())
         elif self.ignore_same_group or self.ignored_group_pairs is not None:

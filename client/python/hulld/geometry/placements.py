@@ -55,7 +55,7 @@ class Placement:
         if self.points is None:
             arguments.hull_id(self.id, "the ID of a placement")
         elif self.id is not None:
-            raise ValueError("a placement has an ID or points, not both")
+            raise ValueError("a placement has both an ID and points; pass one of them")
         else:
             object.__setattr__(self, "points", as_shape(self.points))
 
@@ -77,8 +77,8 @@ def as_shape(points: PointsLike, name: str = "points") -> Points:
     array = as_points(points, name)
     if not 1 <= len(array) <= _MAX_SHAPE_POINTS:
         raise ValueError(
-            f"{name} has {len(array)} points; a shape needs 1 to {_MAX_SHAPE_POINTS}, so "
-            "register a hull of more"
+            f"{name} has {len(array)} points; an inline shape must have 1 to "
+            f"{_MAX_SHAPE_POINTS}; register a hull if there are more"
         )
     return array
 
@@ -307,8 +307,8 @@ def as_indices(values: npt.ArrayLike, count: int, name: str) -> npt.NDArray[np.u
     if not (array.min() >= 0 and array.max() < count):
         at = np.argwhere((array < 0) | (array >= count))[0]
         raise ValueError(
-            f"{name}{arguments.place(tuple(at))} is {array[tuple(at)]}; there are {count}, counted "
-            "from 0"
+            f"{name}{arguments.place(tuple(at))} is {array[tuple(at)]}; indices start at 0 and "
+            f"must be less than {count}"
         )
     return array.astype(np.uint32, copy=False)
 

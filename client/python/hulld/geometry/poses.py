@@ -47,7 +47,7 @@ class Pose:
             values = tuple(arguments.number(v, f"{name}[{i}]") for i, v in enumerate(given))
             object.__setattr__(self, name, values)
         if not any(self.rotation):
-            raise ValueError("rotation is zero; any other quaternion is a rotation")
+            raise ValueError("rotation is zero; use (1, 0, 0, 0) for no rotation")
         rotation = _reordered(np.array([self.rotation]), quaternion_order)[0].tolist()
         object.__setattr__(self, "rotation", tuple(rotation))
 
@@ -202,7 +202,7 @@ def _pack_array(
     zero = ~array[:, :4].any(axis=1)
     if zero.any():
         raise ValueError(
-            f"poses[{int(np.argmax(zero))}]: the quaternion is zero; any other is a rotation"
+            f"poses[{int(np.argmax(zero))}]: the quaternion is zero; use 1 0 0 0 for no rotation"
         )
     return _reordered(array, order)
 
@@ -240,15 +240,15 @@ def _check_matrices(matrices: npt.NDArray[np.float64], tolerance: float) -> None
         off = np.abs(rotations @ rotations.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2))
     if (index := first(~(off <= tolerance))) is not None:
         raise ValueError(
-            f"poses[{index}]: the rotation is not orthogonal: R Rᵀ is off the identity by "
+            f"poses[{index}]: the rotation is not orthogonal: R Rᵀ deviates from the identity by "
             f"{off[index]:.3g}, and at most {tolerance:g} is allowed; orthonormalize it, or accept "
             f"the deviation with orthogonality_tolerance={_rounded_up(off[index])} "
             "(Pose.from_matrix: tolerance)"
         )
     if (index := first(np.linalg.det(rotations) < 0)) is not None:
         raise ValueError(
-            f"poses[{index}]: the matrix mirrors (its determinant is negative), which no motion "
-            "does"
+            f"poses[{index}]: the matrix contains a reflection (its determinant is negative); a "
+            "pose must be a rotation and a translation"
         )
 
 

@@ -221,8 +221,8 @@ class Robot:
                 zero = ~rows[:, w[3:]].any(axis=1)
                 if zero.any():
                     raise ValueError(
-                        f"q[{int(np.argmax(zero))}]: the quaternion of {joint.name} is zero; any "
-                        "other is a rotation"
+                        f"q[{int(np.argmax(zero))}]: the quaternion of {joint.name} is zero; use "
+                        "1 0 0 0 for no rotation"
                     )
         return rows
 

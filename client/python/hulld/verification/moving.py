@@ -180,7 +180,7 @@ def _check_times(relation: Relation, contact: FirstContact, max_time_error: floa
             raise VerificationError("the pair is SEPARATED, but not until 1, or it has a contact")
         return
     if time is None or not 0 <= until <= time <= 1:
-        raise VerificationError(f"the bracket of the contact is {until} to {time}")
+        raise VerificationError(f"the bracket of the contact is invalid: {until} to {time}")
     widest = Fraction(until) + Fraction(max_time_error)
     if Fraction(time) > widest and time > np.nextafter(until, 2):
         raise VerificationError(f"the bracket {until} to {time} is wider than {max_time_error}")

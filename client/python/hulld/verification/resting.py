@@ -60,13 +60,15 @@ class Piece:
             places = np.flatnonzero((self._vertices == vertex).all(axis=1))
             if not places.size:
                 raise VerificationError(
-                    "a vertex pair refers to a point that its shape does not have"
+                    "a vertex pair refers to a point that does not exist in its shape"
                 )
             index = int(places[0])
         if index >= len(self.points):
             raise VerificationError("a vertex pair refers to a vertex that does not exist")
         if not (self._vertices[index] == vertex).all():
-            raise VerificationError(f"a vertex pair gives other coordinates of vertex {index}")
+            raise VerificationError(
+                f"a vertex pair has coordinates that differ from those of vertex {index}"
+            )
         return self.points[index]
 
     def box(self) -> list[tuple[Fraction, Fraction]]:
@@ -174,7 +176,9 @@ def check_bodies(
         if one.piece_a >= len(a) or one.piece_b >= len(b) or (one.piece_a, one.piece_b) in proven:
             raise VerificationError(f"{name} do not exist, or have two certificates")
         if one.relation not in STRENGTH or STRENGTH[one.relation] > STRENGTH[relation]:
-            raise VerificationError(f"{name} are {one.relation.name}, the bodies {relation.name}")
+            raise VerificationError(
+                f"{name} are {one.relation.name}, but the bodies are {relation.name}"
+            )
         try:
             check_pair(one.relation, one.certificate, a[one.piece_a], b[one.piece_b])
         except VerificationError as error:

@@ -230,7 +230,7 @@ class Verifier:
             try:
                 mesh = self._client.get_hull_mesh(version.hull_id)
             except NotFoundError:
-                raise VerificationError(f"hull {version.hull_id} is gone", moved=True) from None
+                raise VerificationError(f"hull {version.hull_id} was deleted", moved=True) from None
             _expect(version, mesh.info, mesh.header)
             known = self._meshes[version.hull_id] = (version, mesh.vertices)
         return known[1]
@@ -251,7 +251,7 @@ class Verifier:
 def _expect(version: HullVersion, info: HullInfo | BodyInfo, header: Header) -> None:
     """Checks that a hull or body is still at the version of an answer."""
     if header.store_id != version.store_id:
-        raise VerificationError("the server's store differs from the answer's")
+        raise VerificationError("the server's store is not the one that the answer came from")
     if (info.create_revision, info.revision) != (version.create_revision, version.revision):
         raise VerificationError(
             f"{version.hull_id} is at revision {info.revision}; the answer is from revision "

@@ -162,14 +162,14 @@ def read_fields(data: bytes | memoryview) -> Iterator[tuple[int, int, Value]]:
 def packed_doubles(value: Value) -> npt.NDArray[np.float64]:
     """The numbers of a `repeated double` field, packed or a single entry: a view, not a copy."""
     if isinstance(value, int) or len(value) % 8:
-        raise WireError("a field of doubles does not hold doubles")
+        raise WireError("a field of doubles has the wrong type or length")
     return np.frombuffer(value, "<f8")
 
 
 def packed_floats(value: Value) -> npt.NDArray[np.float32]:
     """The numbers of a `repeated float` field, as packed_doubles."""
     if isinstance(value, int) or len(value) % 4:
-        raise WireError("a field of floats does not hold floats")
+        raise WireError("a field of floats has the wrong type or length")
     return np.frombuffer(value, "<f4")
 
 

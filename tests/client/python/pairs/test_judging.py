@@ -111,7 +111,7 @@ def test_rows_without_an_exact_answer_fail_alone(client: hulld.Client) -> None:
         ({"relation": ["NEAR"]}, r"relation\[0\] is 'NEAR'"),
         ({"depth": [-1]}, r"depth\[0\] is -1.0; it must be at least 0"),
         ({"distance": ["far"]}, r"distance\[0\] is 'far', not a number"),
-        ({"distance": [1, 2]}, "distance has 2 rows, a 1"),
+        ({"distance": [1, 2]}, "distance has 2 rows, but a has 1"),
     ],
 )
 def test_malformed_tables_are_named(change: dict[str, Any], message: str) -> None:
