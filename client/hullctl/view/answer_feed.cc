@@ -118,7 +118,7 @@ class SceneAnswer {
     TakeHead(part);
     const auto& relations = part.columns().relations();
     if (2 * (part.first_pair() + static_cast<uint64_t>(relations.size())) > pairs.size()) {
-      return absl::InternalError("the answer has more rows than pairs were asked about");
+      return absl::InternalError("the answer has more rows than the request has pairs");
     }
     const uint32_t* pair = pairs.data() + 2 * part.first_pair();
     for (const int number : relations) {
@@ -516,8 +516,8 @@ bool AnswerFeed::AnswerScene(const Question& question) const {
   const auto answer = SceneAnswerJson(client_, question.rules, question.pairs, question.objects,
                                       question.tolerance, question.update);
   if (answer.ok()) return page_->SendText(*answer);
-  return page_->SendText(
-      ProblemMessage(absl::StrCat("Colliding pairs are unknown: ", answer.status().message())));
+  return page_->SendText(ProblemMessage(
+      absl::StrCat("Cannot determine the colliding pairs: ", answer.status().message())));
 }
 
 }  // namespace hulld

@@ -43,7 +43,7 @@ absl::StatusOr<std::string> FindBrowser() {
     const std::string program = fs::path(chosen).is_absolute() ? chosen : FindProgram(chosen);
     if (!program.empty() && access(program.c_str(), X_OK) == 0) return program;
     return absl::FailedPreconditionError(
-        absl::StrCat("HULLCTL_BROWSER names \"", chosen, "\", which is not a program"));
+        absl::StrCat("HULLCTL_BROWSER names \"", chosen, "\", which is not an executable program"));
   }
   for (const char* const name : kBrowsers) {
     if (std::string program = FindProgram(name); !program.empty()) return program;

@@ -26,7 +26,7 @@ absl::StatusOr<std::string> ApplyAppend(const Client& client, const ViewEdit& ed
 absl::StatusOr<std::string> ApplyDelete(const Client& client, const ViewEdit& edit) {
   const auto deleted = client.DeleteHull(edit.hull_id);
   if (!deleted.ok()) return deleted.status();
-  return absl::StrCat(edit.hull_id, " is deleted");
+  return absl::StrCat(edit.hull_id, " was deleted");
 }
 
 std::string EditedMessage(const ViewEdit& edit, const absl::StatusOr<std::string>& outcome) {

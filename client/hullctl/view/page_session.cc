@@ -89,8 +89,7 @@ void PageSession::MoveJoints(const ViewConfiguration& configuration) {
   }
   if (configuration.values.size() != shown_->joints.joints.size() ||
       shown_->joints.joints.empty()) {
-    page_->SendText(
-        ProblemMessage("The page sent values for joints that the scene does not have."));
+    page_->SendText(ProblemMessage("The page sent values of joints that are not in the scene."));
     return;
   }
   const auto poses = shown_->joints.poses(configuration.values);

@@ -64,7 +64,8 @@ bool SessionGuard::HasSession(std::string_view cookies) const {
 
 SessionGuard::Decision SessionGuard::Judge(const PageRequest& request) {
   if (request.host != Host() && request.host != absl::StrCat("localhost:", port_)) {
-    return RefuseRequest(421, absl::StrCat("This is ", Host(), "; open it by that name."));
+    return RefuseRequest(
+        421, absl::StrCat("This server accepts requests only under its own name, ", Host(), "."));
   }
   const std::string own_origin = absl::StrCat("http://", std::string(request.host));
   if ((request.upgrade || !request.origin.empty()) && request.origin != own_origin) {

@@ -19,7 +19,7 @@ export const RELATIONS = {
 
 export const RUNGS = {
   RUNG_BOUNDS: 'bounds of the hulls',
-  RUNG_CACHED: 'what decided before',
+  RUNG_CACHED: 'result of the previous step',
   RUNG_FLOATING_POINT: 'floating point, proven bound',
   RUNG_EXACT: 'exact arithmetic',
 };

@@ -84,7 +84,7 @@ TEST_F(EditFeedTest, AppliesAllChangesInOrder) {
   EXPECT_EQ(hulld_.calls("DeleteHull"), 1);
   // One message per server reply: a thousand changes take a few calls.
   EXPECT_LE(page_->message_count(), 5);
-  EXPECT_THAT(page_->WaitForMessage(page_->message_count() - 1), HasSubstr("other is deleted"));
+  EXPECT_THAT(page_->WaitForMessage(page_->message_count() - 1), HasSubstr("other was deleted"));
 }
 
 TEST_F(EditFeedTest, ReportsDroppedEdits) {

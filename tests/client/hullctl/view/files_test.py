@@ -116,7 +116,7 @@ class FilesTest(viewer_case.ViewerCase):
         self.assertEqual(len(set(colors["corners"])), 1)
 
     def test_a_picture_needs_a_browser(self):
-        for name, words in (("no-such-browser", "is not a program"), ("/bin/false", "produced no picture")):
+        for name, words in (("no-such-browser", "is not an executable program"), ("/bin/false", "produced no picture")):
             refused = subprocess.run(
                 [*self.hulld.command(), "view", "box", "--png", "box.png"], text=True,
                 cwd=self.hulld.directory, capture_output=True,

@@ -326,7 +326,7 @@ class ViewerTest(viewer_case.ViewerCase):
                                               for i in range(0, len(xyz), 3)])
             simple = self.hulld.json("check", "room/right", f"simple-{side}", "--separation",
                                      "--pose-b", "1,0,0,0,0.2,0.5,0.5")["separation"]
-            low, high = shown["of the simpler"]
+            low, high = shown["of the simpler hull"]
             self.assertLess(len(xyz), 3 * 200)
             self.assertLessEqual(low, simple["value"] + simple["bound"])
             self.assertGreaterEqual(high, simple["value"] - simple["bound"])
@@ -472,7 +472,7 @@ class ViewerTest(viewer_case.ViewerCase):
         append = self.browser.driver.find_element(By.ID, "edit-append")
         points.send_keys("0 0 five")
         append.click()
-        self.assertIn("is not three numbers", self.browser.text("#edit-result"))
+        self.assertIn("is not three comma-separated numbers", self.browser.text("#edit-result"))
         points.clear()
         points.send_keys("0 0 5.1\n0, 0, 0")
         append.click()

@@ -118,7 +118,7 @@ class WatchTest(viewer_case.ViewerCase):
         self.file("empty.jsonl", "")
         self.file("broken.jsonl", '{"events": 3}\n')
         for arguments, complaint in (
-                (["box", "--recording", recording], "is a watch of a scene; name the scene file"),
+                (["box", "--recording", recording], "records a watch of a scene; pass the scene file"),
                 (["short.yaml", "--recording", recording], "it has placement 2, but short.yaml ends"),
                 (["--demo", "--recording", recording], "cannot be combined with --demo"),
                 (["box", "--recording", "empty.jsonl"], "contains no event"),

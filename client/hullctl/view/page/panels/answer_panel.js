@@ -114,7 +114,7 @@ export class AnswerPanel {
     const version = [answer.hullA, answer.hullB][k];
     const piece = model.decidingPieces()[k];
     const hull = model.hulls.get(piece ? piece.hullId : object.hullId);
-    if (!hull) return `the vertices of ${piece ? piece.hullId : object.name} are not here`;
+    if (!hull) return `the vertices of ${piece ? piece.hullId : object.name} are not available`;
     // An inline shape has no version, and never changes.
     if (version.hullId && model.revisionOf(object.hullId) !== version.revision)
       return `${object.name} has changed since the answer`;
@@ -175,8 +175,8 @@ export class AnswerPanel {
     const {word, sign} = RELATIONS[tolerant.relation];
     return [
       ['tolerance', rounded(tolerant.tolerance)],
-      ['with it', `${sign} ${word}`],
-      ['decided then by', RUNGS[tolerant.rung]],
+      ['relation with it', `${sign} ${word}`],
+      ['then decided by', RUNGS[tolerant.rung]],
     ];
   }
 

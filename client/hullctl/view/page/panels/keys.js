@@ -4,18 +4,18 @@ import {element} from 'hulld/panels/dom.js';
 // Keys, their descriptions, and their actions.
 export function bindKeys(actions) {
   const table = [
-    [['0', '7'], '\u2013', 'show a scene of the demo', null],
+    [['0', '7'], '\u2013', 'show a demo scene', null],
     [['F'], '', 'show everything', actions.fit],
     [['C'], '', 'fly to the selected object', actions.flyToSelected],
     [['J'], '', 'select the next object', () => actions.step(1)],
     [['K'], '', 'select the previous object', () => actions.step(-1)],
-    [['B'], '', 'take the next object as the other one of the pair', actions.nextOther],
+    [['B'], '', 'pair the selected object with the next one', actions.nextOther],
     [['N'], '', 'fly to the next pair that collides', actions.nextCollision],
-    [['Esc'], '', 'select nothing', actions.deselect],
-    [['G'], '', 'handles that move', () => actions.mode('translate')],
-    [['R'], '', 'handles that turn', () => actions.mode('rotate')],
+    [['Esc'], '', 'clear the selection', actions.deselect],
+    [['G'], '', 'show handles for moving', () => actions.mode('translate')],
+    [['R'], '', 'show handles for turning', () => actions.mode('rotate')],
     [['X', 'Y', 'Z'], ' ', 'move the object a step along an axis; with Shift back', null],
-    [['Backspace'], '', 'put the object back where it was', actions.reset],
+    [['Backspace'], '', 'return the object to its original pose', actions.reset],
     [['.'], '', 'play the timeline', actions.play],
     [[','], '', 'go to the first contact of a motion', actions.contact],
     [['U'], '', 'undo the last motion; also Ctrl+Z', actions.undo],
@@ -33,11 +33,11 @@ export function bindKeys(actions) {
     [['H'], '', 'hull', () => actions.show('hull')],
     [['E'], '', 'edges', () => actions.show('edges')],
     [['L'], '', 'labels', () => actions.show('labels')],
-    [['#'], '', 'grid of the ground', () => actions.show('grid')],
+    [['#'], '', 'ground grid', () => actions.show('grid')],
     [['V'], '', 'hide or show the selected object', actions.toggleVisible],
     [['/'], '', 'search', actions.search],
-    [['D'], '', 'light or dark', actions.theme],
-    [['?'], '', 'this list', actions.help],
+    [['D'], '', 'light or dark theme', actions.theme],
+    [['?'], '', 'show this list', actions.help],
   ];
   const list = document.getElementById('keys-list');
   for (const [keys, between, text] of table) {

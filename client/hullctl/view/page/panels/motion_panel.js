@@ -98,7 +98,7 @@ export class MotionPanel {
     if (isStale(hullId) || pieces.some((piece) => isStale(piece.hullId)))
       return `${object.name} has changed since the answer`;
     const missing = pieces.find((piece) => !model.hulls.has(piece.hullId));
-    if (missing) return `the vertices of ${missing.hullId} are not here`;
+    if (missing) return `the vertices of ${missing.hullId} are not available`;
     return pieces.map(({hullId, pose = null, radius: ofPiece = 0}) => ({
                         xyz: model.hulls.get(hullId).xyz,
                         poses: pose ? [start, pose] : [start],

@@ -285,7 +285,7 @@ export class ObjectPanel {
     });
     this.editResult = element('p', {className: 'quiet', id: 'edit-result', 'aria-live': 'polite'});
     const block = element(
-        'div', {className: 'block'}, element('h2', {}, 'Change it'), points,
+        'div', {className: 'block'}, element('h2', {}, 'Edit this hull'), points,
         element('div', {className: 'buttons'}, append, remove), this.editResult);
     this.editing = {object, block};
     return block;
@@ -349,8 +349,8 @@ export class ObjectPanel {
     ];
     return [
       ['exact separation', rounded(value)],
-      ['of the simpler', rounded(low), ' to ', rounded(high)],
-      ['which is', relations.filter(Boolean).join(' or ')],
+      ['of the simpler hull', rounded(low), ' to ', rounded(high)],
+      ['relation', relations.filter(Boolean).join(' or ')],
     ];
   }
 

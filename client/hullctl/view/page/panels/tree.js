@@ -166,7 +166,7 @@ export class Tree {
     });
     const rest = pieces.length - rows.length;
     if (rest > 0) {
-      rows.push(element('div', {className: 'more'}, `and ${grouped(rest)} pieces more`));
+      rows.push(element('div', {className: 'more'}, `and ${grouped(rest)} more pieces`));
     }
     return rows;
   }
