@@ -31,7 +31,7 @@ ExitCode PutBody(const Invocation& run, const BodyArguments& arguments) {
   if (arguments.if_revision) request.set_if_revision(*arguments.if_revision);
   if (arguments.pieces.empty() == arguments.file.empty()) {
     return run.FailUsage(absl::InvalidArgumentError(
-        "give the pieces as HULL[@POSE][:RADIUS], or with --pieces FILE, but not both"));
+        "pass the pieces as HULL[@POSE][:RADIUS] or with --pieces FILE, but not both"));
   }
   for (const std::string& text : arguments.pieces) {
     const absl::StatusOr<v1::Placement> piece = ParsePiece(text);

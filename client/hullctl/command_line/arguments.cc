@@ -84,7 +84,7 @@ absl::StatusOr<std::array<double, 3>> ParseTriple(const std::string& text) {
   if (!numbers.ok()) return numbers.status();
   if (numbers->size() != 3) {
     return absl::InvalidArgumentError(
-        absl::StrCat(Quoted(text), " is not three numbers x,y,z with commas between them"));
+        absl::StrCat(Quoted(text), " is not three comma-separated numbers x,y,z"));
   }
   return std::array<double, 3>{(*numbers)[0], (*numbers)[1], (*numbers)[2]};
 }
@@ -92,8 +92,7 @@ absl::StatusOr<std::array<double, 3>> ParseTriple(const std::string& text) {
 absl::StatusOr<v1::Pose> PoseFromNumbers(const std::vector<double>& numbers) {
   if (numbers.size() != 3 && numbers.size() != 7) {
     return absl::InvalidArgumentError(absl::StrCat(
-        "a pose has 3 numbers, x,y,z, or 7, w,x,y,z,x,y,z, with commas between them; got ",
-        numbers.size()));
+        "a pose has 3 comma-separated numbers, x,y,z, or 7, w,x,y,z,x,y,z; got ", numbers.size()));
   }
   v1::Pose pose;
   const double* t = numbers.data();

@@ -46,9 +46,9 @@ absl::StatusOr<std::vector<SettingsLayer>> LayersOf(const Invocation& invocation
   const bool by_option = !invocation.context.empty();
   const auto server = invocation.flags.find("server");
   if (by_option && server != invocation.flags.end() && server->second != context->at("server")) {
-    return absl::InvalidArgumentError(absl::StrCat("--server ", server->second, " and --context ",
-                                                   named.name, ", which is ", context->at("server"),
-                                                   " differ; give one of them"));
+    return absl::InvalidArgumentError(
+        absl::StrCat("--server ", server->second, " differs from the server of --context ",
+                     named.name, ", ", context->at("server"), "; pass one of the two options"));
   }
   SettingsLayer layer{"context " + named.name, *std::move(context), !by_option};
   if (by_option) layers[1].only_for_its_server = true;

@@ -23,8 +23,7 @@ absl::Status WriteOutput(const std::string& path, std::ostream& standard,
   write(file);
   file.close();
   if (file) return absl::OkStatus();
-  return absl::InvalidArgumentError(
-      absl::StrCat("cannot write all of ", path, ": ", strerror(errno)));
+  return absl::InvalidArgumentError(absl::StrCat("cannot write ", path, ": ", strerror(errno)));
 }
 
 }  // namespace hulld

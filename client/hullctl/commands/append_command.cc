@@ -229,7 +229,7 @@ ExitCode SplitAppend(const Invocation& run, const AppendArguments& arguments) {
   if (arguments.resume || !arguments.writer.empty() || input.skip_nonfinite || input.skip_zero ||
       !input.format.empty() || input.chunk_points != 0) {
     return run.FailUsage(absl::InvalidArgumentError(
-        "--split can be combined only with --create; the file name gives the format"));
+        "--split can be combined only with --create; the format follows from the file name"));
   }
   const SplitBy split = arguments.split == "names" ? SplitBy::kName : SplitBy::kComponent;
   return AppendParts(run, arguments.hull_id, input.files, split, arguments.create);

@@ -146,7 +146,7 @@ void PrintLoadTable(const LoadArguments& arguments, const LoadResult& result, st
   }
   if (succeeded > 0) table.Row({"latency max", TimeText(result.latencies.max())});
   for (const auto& [code, failures] : result.failures) {
-    table.Row({CodeName(code), absl::StrCat(failures.count, ", such as: ", failures.message)});
+    table.Row({CodeName(code), absl::StrCat(failures.count, ", for example: ", failures.message)});
   }
   table.Print(out);
   if (succeeded == 0) return;

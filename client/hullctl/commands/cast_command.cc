@@ -135,13 +135,13 @@ absl::StatusOr<Hits> Cast(const Client& client, const Ray& ray, const v1::ListHu
     const int count = part.columns().relations_size();
     if (part.pairs_size() != 2 * count ||
         !AreParallel(part.columns(), static_cast<size_t>(count))) {
-      return absl::InternalError("the answers lack pairs or entries of columns");
+      return absl::InternalError("pairs or entries of columns are missing from the answers");
     }
     for (int i = 0; i < count; ++i) {
       // Placement 0 is the ray.
       const int hull = static_cast<int>(part.pairs(2 * i + 1)) - 1;
       if (hull < 0 || hull >= list.hulls_size()) {
-        return absl::InternalError("an answer is about a placement that the request does not have");
+        return absl::InternalError("an answer refers to a placement that is not in the request");
       }
       const AnswerRow row = RowAt(part.columns(), i);
       if (!row.first_contact || !row.first_contact->has_contact_time()) {

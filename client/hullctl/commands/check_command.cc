@@ -239,8 +239,10 @@ absl::Status RefuseOptionsOfPairs(const PairArguments& arguments) {
                   {wanted.has_max_time_error(), "--max-time-error"},
                   {wanted.has_resolution(), "--resolution"}});
   if (name == nullptr) return absl::OkStatus();
-  return absl::InvalidArgumentError(absl::StrCat(
-      "--points takes --pose-a, --radius-a, --separation, and --max-error; remove ", name));
+  return absl::InvalidArgumentError(
+      absl::StrCat("--points can be combined only with --pose-a, --radius-a, --separation, and "
+                   "--max-error; remove ",
+                   name));
 }
 
 // INVALID_ARGUMENT: two options exclude each other. The server refuses them as well, but names the
@@ -266,9 +268,10 @@ absl::Status RefuseConflicts(const PairArguments& arguments) {
                                           tolerance,
                                           textbook});
   if (moves && measure != nullptr) {
-    return error(absl::StrCat(measure,
-                              " applies to a pose, and --to-a and --to-b give a motion; query the "
-                              "first contact, then query again at its pose"));
+    return error(
+        absl::StrCat(measure,
+                     " applies to a pose, but --to-a and --to-b define a motion; query the "
+                     "first contact, then query again at its pose"));
   }
   const char* const limit = FirstGiven({{wanted.has_max_time_error(), "--max-time-error"},
                                         {wanted.has_resolution(), "--resolution"}});
@@ -285,12 +288,12 @@ absl::Status RefuseConflicts(const PairArguments& arguments) {
                                         normal,
                                         clearance});
   if (tolerance.first && exact != nullptr) {
-    return error(absl::StrCat(exact, " needs the exact relation; remove it, or --tolerance"));
+    return error(absl::StrCat(exact, " needs the exact relation; remove it or --tolerance"));
   }
   const char* const radius = FirstGiven({{arguments.request.a().radius() > 0, "--radius-a"},
                                          {arguments.request.b().radius() > 0, "--radius-b"}});
   if (textbook.first && radius != nullptr) {
-    return error(absl::StrCat("--textbook does not support radii; remove it, or ", radius));
+    return error(absl::StrCat("--textbook does not support radii; remove it or ", radius));
   }
   return absl::OkStatus();
 }
@@ -443,7 +446,7 @@ void AddCheckCommand(Command program, Invocation* invocation) {
       "and its certificate has one part for each pair of pieces that bounding boxes do not\n"
       "decide; --output json shows them. --textbook supports neither bodies nor radii.\n"
       "\n"
-      "--to-a and --to-b give a motion, from time 0 to time 1, with quaternion and translation\n"
+      "--to-a and --to-b define a motion, from time 0 to time 1, with quaternion and translation\n"
       "linear in time. Of the two quaternions of the end rotation, hullctl picks the one with the\n"
       "shorter path. The relation covers all times, and contact is never missed.");
   command.SetExamples(

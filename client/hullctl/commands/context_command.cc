@@ -84,7 +84,7 @@ ExitCode Add(const Invocation& run, const ContextArguments& arguments) {
 
 ExitCode Use(const Invocation& run, const ContextArguments& arguments) {
   if (arguments.none == !arguments.name.empty()) {
-    return run.FailUsage(absl::InvalidArgumentError("give the name of a context, or --none"));
+    return run.FailUsage(absl::InvalidArgumentError("pass the name of a context, or --none"));
   }
   auto file = ReadContextFile();
   if (!file.ok()) return run.FailUsage(file.status());

@@ -101,7 +101,7 @@ ExitCode DeleteHulls(const Invocation& run, const DeleteArguments& arguments) {
     return run.FailUsage(absl::InvalidArgumentError(what));
   };
   if (arguments.hull_ids.empty() == !arguments.has_prefix) {
-    return usage("give the IDs of the hulls to delete, or --prefix, but not both");
+    return usage("pass either the IDs of the hulls to delete or --prefix");
   }
   if (arguments.if_revision && arguments.hull_ids.size() != 1) {
     return usage("--if-revision requires exactly one hull");

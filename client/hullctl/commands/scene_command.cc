@@ -33,7 +33,7 @@ class SceneRun {
     absl::Status status = run_.MakeClient().FindCollisions(
         request_, [this](const v1::FindCollisionsResponse& part) { return Take(part); });
     if (status.ok() && !complete_) {
-      status = absl::InternalError("the answers end without their totals");
+      status = absl::InternalError("the answers end without totals");
     }
     bar_.Clear();
     if (status.ok() && !run_.json() && !run_.names()) PrintTotals();
@@ -175,7 +175,7 @@ ExitCode FindInScene(const Invocation& run, const SceneArguments& arguments) {
     return run.FailUsage(absl::InvalidArgumentError(
         absl::StrCat(arguments.file,
                      ": 'hullctl scene FILE' finds pairs itself, but the file names pairs; use "
-                     "'hullctl scene check' or 'hullctl batch', or remove them")));
+                     "'hullctl scene check' or 'hullctl batch', or remove the pairs")));
   }
   return Find(run, arguments, &*read);
 }
@@ -189,9 +189,9 @@ ExitCode CheckScene(const Invocation& run, const SceneArguments& arguments) {
                                : arguments.every_piece ? "--every-piece"
                                                        : nullptr;
     if (option != nullptr) {
-      return run.FailUsage(absl::InvalidArgumentError(
-          absl::StrCat(arguments.file, ": ", option,
-                       " finds pairs itself, but the file names pairs; remove one of them")));
+      return run.FailUsage(absl::InvalidArgumentError(absl::StrCat(
+          arguments.file, ": ", option,
+          " finds pairs itself, but the file names pairs; remove the option or the pairs")));
     }
     return AnswerPairs(run, arguments.file, *read, arguments.details, /*colliding=*/false);
   }

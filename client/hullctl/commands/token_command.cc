@@ -38,7 +38,7 @@ std::string HashText(const std::string& token) {
 absl::StatusOr<std::string> RandomToken() {
   std::array<char, 32> bytes = {};
   if (getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size())) {
-    return absl::InternalError("the system provides no random bytes");
+    return absl::InternalError("cannot read random bytes from the system");
   }
   return absl::StrCat("hulld_",
                       absl::WebSafeBase64Escape(absl::string_view(bytes.data(), bytes.size())));

@@ -186,13 +186,14 @@ class Viewing {
     const std::vector<std::string>& things = arguments_.things;
     if (watch->is_of_pairs != (things.size() == 1 && IsScene(things[0]))) {
       return absl::InvalidArgumentError(absl::StrCat(
-          path, watch->is_of_pairs ? " is a watch of a scene; name the scene file that was watched"
-                                   : " is a watch of hulls; name their IDs or prefix, or nothing"));
+          path, watch->is_of_pairs
+                    ? " records a watch of a scene; pass the scene file that was watched"
+                    : " records a watch of hulls; pass their IDs or prefix, or no argument"));
     }
     if (watch->is_of_pairs && watch->placements > scene->objects.size()) {
-      return absl::InvalidArgumentError(
-          absl::StrCat(path, " is a watch of another scene: it has placement ",
-                       watch->placements - 1, ", but ", things[0], " ends before it"));
+      return absl::InvalidArgumentError(absl::StrCat(
+          path, " records a watch of another scene: it contains placement ", watch->placements - 1,
+          ", but the indices of ", things[0], " end at ", scene->objects.size() - 1));
     }
     scene->watch = std::move(watch->messages);
     scene->note = absl::StrCat("A recorded watch: the timeline shows the ",
@@ -334,12 +335,12 @@ ExitCode View(const Invocation& run, const ViewArguments& arguments) {
   if (!is_robot && !(arguments.robot.joints.empty() && arguments.robot.srdf.empty() &&
                      arguments.robot.ignored.empty() && arguments.robot.robot.packages.empty())) {
     return run.FailUsage(absl::InvalidArgumentError(
-        "--joints, --srdf, --ignore, and --package apply to a robot: name one .urdf file"));
+        "--joints, --srdf, --ignore, and --package apply to a robot; pass one .urdf file"));
   }
   const std::string& scene = arguments.scene;
   if (!scene.empty() && !arguments.demo && !is_robot) {
     return run.FailUsage(absl::InvalidArgumentError(
-        "--scene needs --demo, or a robot to place in the scene: name one .urdf file"));
+        "--scene needs --demo, or a robot to place in the scene; pass one .urdf file"));
   }
   if (!scene.empty() && arguments.demo && (scene.size() != 1 || scene[0] < '0' || scene[0] > '7')) {
     return run.FailUsage(absl::InvalidArgumentError(

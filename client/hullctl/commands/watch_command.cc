@@ -220,7 +220,7 @@ void AddWatchCommand(Command program, Invocation* invocation) {
       if (options->scene.empty()) return WatchHulls(run, *options);
       if (options->prefix.empty() && !options->exact) return WatchScene(run, *options);
       return run.FailUsage(
-          absl::InvalidArgumentError("--scene cannot be combined with PREFIX and --exact"));
+          absl::InvalidArgumentError("--scene cannot be combined with PREFIX or --exact"));
     };
   });
 }

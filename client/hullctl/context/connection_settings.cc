@@ -19,7 +19,7 @@ absl::StatusOr<std::string> ReadPem(const std::string& path) {
   if (!file) return absl::InvalidArgumentError(absl::StrCat(path, ": ", std::strerror(errno)));
   std::string text{std::istreambuf_iterator<char>(file), {}};
   if (text.find("-----BEGIN ") == std::string::npos) {
-    return absl::InvalidArgumentError(path + ": it is not in PEM format");
+    return absl::InvalidArgumentError(path + ": not in PEM format");
   }
   return text;
 }

@@ -61,8 +61,8 @@ absl::StatusOr<ConnectionSettings> ReadContext(const std::string& path, const st
     } else if (!is_flag && text.kind_case() == Value::kStringValue) {
       settings[member] = text.string_value();
     } else {
-      return Damaged(path, absl::StrCat(place, ": ", member, " is not a ",
-                                        is_flag ? "true or false" : "text"));
+      return Damaged(path, absl::StrCat(place, ": ", member, " is not ",
+                                        is_flag ? "true or false" : "a string"));
     }
   }
   if (!settings.contains("server")) return Damaged(path, place + " has no server");
@@ -152,7 +152,8 @@ absl::StatusOr<ContextFile> ReadContextFile() {
 absl::Status WriteContextFile(const ContextFile& file) {
   const std::string path = ContextFilePath();
   if (path.empty()) {
-    return absl::InvalidArgumentError("no folder for contexts; set HOME or XDG_CONFIG_HOME");
+    return absl::InvalidArgumentError(
+        "cannot determine the folder of contexts; set HOME or XDG_CONFIG_HOME");
   }
   const auto problem = [](const std::string& place, int error) {
     return absl::InvalidArgumentError(

@@ -37,7 +37,8 @@ bool IsProgram(const fs::path& path) { return access(path.c_str(), X_OK) == 0; }
 absl::StatusOr<std::string> FindServer() {
   if (const char* const named = std::getenv("HULLD_BINARY"); named != nullptr) {
     if (IsProgram(named)) return named;
-    return absl::NotFoundError(absl::StrCat("HULLD_BINARY is ", named, ", which is not a program"));
+    return absl::NotFoundError(
+        absl::StrCat("HULLD_BINARY is ", named, ", which is not an executable program"));
   }
   std::error_code ignored;
   std::vector<fs::path> folders = {fs::read_symlink("/proc/self/exe", ignored).parent_path()};

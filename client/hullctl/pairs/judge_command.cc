@@ -293,7 +293,7 @@ class JudgeRun {
     plot.wrong = static_cast<double>(wrong_.size()) / static_cast<double>(answers_.size());
     if (resting.empty() || plot.times.empty()) {
       return absl::InvalidArgumentError(
-          "--plot needs pairs at rest, and a column us: microseconds of each answer");
+          "--plot needs pairs at rest and a column us, the microseconds of each answer");
     }
     const Answers part = resting.subspan(0, std::min(kAnswersPerCall, resting.size()));
     for (const double exponent : {-15.0, -12.0, -9.0, -6.0, -3.0}) {

@@ -156,7 +156,7 @@ class TableReader {
     for (const char* name : {"a", "b"}) {
       if (!Has(name)) {
         return absl::InvalidArgumentError(absl::StrCat(
-            "the header has no column ", name, ", which contains an ID or a file for each row"));
+            "the header has no column ", name, "; it must contain an ID or a file in each row"));
       }
       for (const std::string& first : {absl::StrCat(name, "_q"), absl::StrCat(name, "_to_q")}) {
         const auto given = std::count_if(columns_.begin(), columns_.end(), [&](const auto& column) {
@@ -177,8 +177,8 @@ class TableReader {
 
   absl::StatusOr<JudgedAnswer> ReadRow(const std::vector<std::string_view>& cells) const {
     if (cells.size() != columns_.size()) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("the row has ", cells.size(), " cells, the header ", columns_.size()));
+      return absl::InvalidArgumentError(absl::StrCat(
+          "the row has ", cells.size(), " cells, but the header has ", columns_.size()));
     }
     JudgedAnswer answer;
     answer.poses[0] = answer.poses[1] = kNoMotion;
@@ -219,7 +219,7 @@ class TableReader {
     }
     return absl::InvalidArgumentError(
         absl::StrCat(name, "_qw, ", name, "_qx, ", name, "_qy, ", name,
-                     "_qz are all 0; any other quaternion is a rotation"));
+                     "_qz are all 0; use 1, 0, 0, 0 for no rotation"));
   }
 
   // Sets the end pose of a side: the pose, with the cells that are given, on the shorter path.

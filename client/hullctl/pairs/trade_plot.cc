@@ -49,13 +49,13 @@ std::string ScriptOf(const TradePlot& plot, const std::string& path) {
 
 absl::Status WriteTradePlot(const TradePlot& plot, const std::string& path) {
   if (path.find_first_of("'\n") != std::string::npos || !std::ofstream(path, std::ios::app)) {
-    return absl::InvalidArgumentError(absl::StrCat(path, ": cannot be written"));
+    return absl::InvalidArgumentError(absl::StrCat("cannot write ", path));
   }
   if (std::system("command -v gnuplot > /dev/null") != 0) {
     return absl::NotFoundError("--plot needs gnuplot; install it (Debian: gnuplot-nox)");
   }
   FILE* const gnuplot = popen("gnuplot", "w");
-  if (gnuplot == nullptr) return absl::InternalError("gnuplot cannot be started");
+  if (gnuplot == nullptr) return absl::InternalError("cannot start gnuplot");
   const std::string script = ScriptOf(plot, path);
   fwrite(script.data(), 1, script.size(), gnuplot);
   const int status = pclose(gnuplot);

@@ -46,7 +46,7 @@ class PieceFetcher {
       if (piece.radius() > 0) {
         return absl::InvalidArgumentError(
             absl::StrCat("body ", Quoted(word), ": piece ", i,
-                         " has a radius; 'cover' supports only hulls without one"));
+                         " has a radius; 'cover' supports only pieces without one"));
       }
       const absl::Status taken = AddHull(piece.hull_id(), NumbersOf(piece.pose()));
       if (absl::IsNotFound(taken)) {
@@ -139,7 +139,7 @@ void PrintCoverage(const Invocation& run, const CoverArguments& arguments, const
 ExitCode AnswerCover(const Invocation& run, const CoverArguments& arguments) {
   if (arguments.words.size() < 2) {
     return run.FailUsage(absl::InvalidArgumentError(
-        "give IDs of hulls or bodies, then the file of the mesh: hullctl cover ID... FILE"));
+        "pass IDs of hulls or bodies, then the mesh file: hullctl cover ID... FILE"));
   }
   std::vector<std::string> hulls = arguments.words;
   const std::string file = hulls.back();
@@ -147,7 +147,7 @@ ExitCode AnswerCover(const Invocation& run, const CoverArguments& arguments) {
   const auto mesh = ReadMesh(file);
   if (!mesh.ok()) return run.FailUsage(mesh.status());
   if (mesh->triangles.empty()) {
-    return run.FailUsage(absl::InvalidArgumentError(file + ": contains no triangle"));
+    return run.FailUsage(absl::InvalidArgumentError(file + ": contains no triangles"));
   }
   const Client client = run.MakeClient();
   PieceFetcher fetcher(client);

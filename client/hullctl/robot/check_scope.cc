@@ -57,7 +57,7 @@ absl::Status RemoveIgnored(const std::vector<std::string>& ignored, const RobotM
     if (kept.size() == pairs->size()) {
       return absl::InvalidArgumentError(
           absl::StrCat("--ignore: ", Quoted(entry), " is not a checked pair; pass two ",
-                       "names of links or placements, as in forearm_link,table"));
+                       "names of links or placements, such as forearm_link,table"));
     }
     *pairs = std::move(kept);
   }

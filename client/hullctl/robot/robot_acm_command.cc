@@ -96,7 +96,7 @@ absl::Status Sample(const Invocation& run, const AcmArguments& arguments, const 
         const LinkPair links =
             MakeLinkPair(model.parts[pairs[2 * pair]].link, model.parts[pairs[2 * pair + 1]].link);
         if (row.relation == v1::RELATION_UNSPECIFIED) {
-          problem = absl::InternalError(absl::StrCat("a pair failed: ", cause));
+          problem = absl::InternalError(absl::StrCat("a pair cannot be checked: ", cause));
         }
         Tally& tally = (*tallies)[links];
         if (row.relation == v1::RELATION_SEPARATED || tally.last == sample) return;

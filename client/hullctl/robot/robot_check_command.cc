@@ -249,7 +249,7 @@ absl::Status RobotCheck::CheckContinuousOptions() {
   if (!arguments_.continuous) return absl::OkStatus();
   if (!waypoints_.has_many()) {
     return absl::InvalidArgumentError(
-        "--continuous checks the motion between waypoints; pass two or more with --joints");
+        "--continuous checks the motion between waypoints; pass at least two with --joints");
   }
   v1::Wanted wanted = arguments_.details.wanted;
   wanted.clear_clearance();
@@ -257,8 +257,8 @@ absl::Status RobotCheck::CheckContinuousOptions() {
     return absl::OkStatus();
   }
   return absl::InvalidArgumentError(
-      "--continuous finds first contacts; it takes --clearance, but no --tolerance and no other "
-      "result");
+      "--continuous finds first contacts; it can be combined with --clearance, but not with "
+      "--tolerance or options for other results");
 }
 
 absl::Status RobotCheck::CheckMotions(CheckScope scope) {

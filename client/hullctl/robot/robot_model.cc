@@ -171,7 +171,7 @@ absl::Status ReduceToVertices(const Invocation& run, HullBuilder* builder, Robot
     return absl::Status(hull.status().code(),
                         absl::StrCat(part->name, " has more than ", kMaxShapePoints,
                                      " points, and the local server that would reduce them to its "
-                                     "hull failed; pass --prefix to do without: ",
+                                     "hull failed; pass --prefix to register the hulls instead: ",
                                      hull.status().message()));
   }
   if (hull->vertex_count() > kMaxShapePoints) {

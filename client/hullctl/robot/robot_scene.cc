@@ -57,7 +57,7 @@ absl::StatusOr<std::vector<std::vector<double>>> ReadWaypoints(const std::string
     waypoints.push_back(values);
   }
   if (!waypoints.empty()) return waypoints;
-  return absl::InvalidArgumentError(absl::StrCat(path, ": contains no waypoint"));
+  return absl::InvalidArgumentError(absl::StrCat(path, ": contains no waypoints"));
 }
 
 std::vector<Pose7> PosesAt(const RobotModel& model, const std::vector<double>& values) {
@@ -88,7 +88,7 @@ void AddJoints(const std::shared_ptr<const RobotModel>& model, ViewJoints* joint
     const std::string joint = JointWithoutRotation(model->robot, values);
     if (joint.empty()) return PosesAt(*model, values);
     return absl::InvalidArgumentError(
-        absl::StrCat("The quaternion of ", joint, " is zero; any other one is a rotation."));
+        absl::StrCat("The quaternion of ", joint, " is zero; use 1, 0, 0, 0 for no rotation."));
   };
 }
 

@@ -26,8 +26,8 @@ absl::Status SetJoint(const Robot& robot, const std::string& name, const std::st
     if (ParseDouble(text, value) == NumberText::kNumber && std::isfinite(*value)) {
       return absl::OkStatus();
     }
-    return absl::InvalidArgumentError(absl::StrCat(Quoted(text), " is not a value of ",
-                                                   Quoted(name), "; give a number, as in ", name,
+    return absl::InvalidArgumentError(absl::StrCat(Quoted(text), " is not a value of joint ",
+                                                   Quoted(name), "; pass a number, as in ", name,
                                                    "=0.5"));
   }
   const int joint = robot.FindJoint(name);
@@ -36,7 +36,7 @@ absl::Status SetJoint(const Robot& robot, const std::string& name, const std::st
                                       : nullptr;
   if (loose == nullptr) {
     return absl::InvalidArgumentError(absl::StrCat(Quoted(name), " is not a joint of ", robot.name,
-                                                   " with a value", Suggestion(name, known)));
+                                                   " that can be set", Suggestion(name, known)));
   }
   JointValue value = {};
   if (loose->kind == JointKind::kFloating) {
@@ -96,7 +96,7 @@ absl::Status WaypointSource::Open(const std::string& file) {
   }
   has_many_ = pending_.size() > 1;
   if (!pending_.empty()) return absl::OkStatus();
-  return absl::InvalidArgumentError(absl::StrCat(source_->name(), ": contains no waypoint"));
+  return absl::InvalidArgumentError(absl::StrCat(source_->name(), ": contains no waypoints"));
 }
 
 absl::StatusOr<bool> WaypointSource::Read(Waypoint* free_values) {

@@ -99,7 +99,7 @@ absl::Status WaypointStream::Take(const v1::StreamCollisionsResponse& answer, si
   }
   for (size_t i = 0; i < rows; ++i) {
     if (answer.pairs(static_cast<int>(i)) != i) {
-      return absl::InternalError("the answer lacks a pair that moved");
+      return absl::InternalError("a pair that moved is missing from the answer");
     }
     const AnswerRow row = RowAt(answer.columns(), static_cast<int>(i));
     const size_t lane = i / pairs;

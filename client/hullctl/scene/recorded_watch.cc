@@ -65,7 +65,7 @@ absl::StatusOr<RecordedWatch> ReadRecordedWatch(const std::string& path) {
   if (!(*source)->status().ok()) return (*source)->status();
   if (!watch.messages.empty()) return watch;
   return absl::InvalidArgumentError(
-      absl::StrCat(path, ": contains no event; write it with 'hullctl watch --output json'"));
+      absl::StrCat(path, ": contains no events; write it with 'hullctl watch --output json'"));
 }
 
 }  // namespace hulld

@@ -122,7 +122,7 @@ TEST_F(HullctlQuestions, MotionsShowTheirFirstContact) {
   ran = Ask(with({"--separation"}));
   EXPECT_EQ(ran.code, 2);
   EXPECT_THAT(ran.err,
-              HasSubstr("--separation applies to a pose, and --to-a and --to-b give a motion"));
+              HasSubstr("--separation applies to a pose, but --to-a and --to-b define a motion"));
 
   ran = Ask({"check", "cube", "cube", "--pose-b", "3,0,0", "--to-b", "2,0,0"});
   EXPECT_THAT(ran.out, HasSubstr("relation         SEPARATED\n"));
@@ -476,14 +476,14 @@ TEST_F(HullctlQuestions, ConflictingOptionsAreExplained) {
     EXPECT_THAT(ran.err, HasSubstr(problem));
   };
   usage({"--tolerance", "0.1", "--separation"},
-        "--separation needs the exact relation; remove it, or --tolerance");
+        "--separation needs the exact relation; remove it or --tolerance");
   usage({"--tolerance", "0.1", "--verify"}, "--verify needs the exact relation");
-  usage({"--to-b", "1,0,0", "--normal"}, "--normal applies to a pose, and --to-a and --to-b give");
+  usage({"--to-b", "1,0,0", "--normal"},
+        "--normal applies to a pose, but --to-a and --to-b define");
   usage({"--to-a", "1,0,0", "--max-error", "1"}, "--max-error applies to a pose");
   usage({"--max-time-error", "0.1"}, "--max-time-error applies to a motion; add --to-a or --to-b");
   usage({"--resolution", "0.1"}, "--resolution applies to a motion");
-  usage({"--textbook", "--radius-b", "1"},
-        "--textbook does not support radii; remove it, or --rad");
+  usage({"--textbook", "--radius-b", "1"}, "--textbook does not support radii; remove it or --rad");
   EXPECT_EQ(Ask({"check", "cube", "cube", "--tolerance", "0", "--separation"}).code, 0);
   Ran ran = Ask({"check", "cube", "cube", "--tolerance", "-1"});
   EXPECT_EQ(ran.code, 2);

@@ -44,7 +44,7 @@ TEST(Arguments, NumbersWithoutCommasAreExplained) {
                 testing::HasSubstr("separate numbers with commas, as in 1,0,0"));
   }
   EXPECT_THAT(std::string(ParsePose("1,2").status().message()),
-              testing::HasSubstr("3 numbers, x,y,z, or 7, w,x,y,z,x,y,z, with commas"));
+              testing::HasSubstr("3 comma-separated numbers, x,y,z, or 7, w,x,y,z,x,y,z"));
 }
 
 }  // namespace arguments_test

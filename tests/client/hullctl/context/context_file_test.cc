@@ -117,7 +117,7 @@ TEST_F(Contexts, DamagedFilesAreExplained) {
   EXPECT_THAT(problem(R"({"contexts":{"a":{}}})"), HasSubstr("context \"a\" has no server"));
   EXPECT_THAT(problem(R"({"contexts":{"a b":{"server":"a:1"}}})"), HasSubstr("a name is up to"));
   EXPECT_THAT(problem(R"({"contexts":{"a":{"server":"a:1","tls":"yes"}}})"),
-              HasSubstr("tls is not a true or false"));
+              HasSubstr("tls is not true or false"));
   // A token does not belong in this file, and errors do not quote it.
   EXPECT_THAT(problem(R"({"contexts":{"a":{"server":"a:1","token":"hunter2"}}})"),
               AllOf(HasSubstr("\"token\", which is not a setting"), Not(HasSubstr("hunter2"))));
@@ -165,7 +165,8 @@ TEST_F(Contexts, OptionThenEnvironmentThenContextThenDefault) {
   EXPECT_EQ(server({}), "env:1");
   EXPECT_EQ(server({"--context", "a"}), "a:1");
   EXPECT_EQ(server({"--server", "c:1"}), "c:1");
-  EXPECT_THAT(server({"--server", "c:1", "--context", "a"}), HasSubstr("differ; give one of them"));
+  EXPECT_THAT(server({"--server", "c:1", "--context", "a"}),
+              HasSubstr("differs from the server of --context a"));
   setenv("HULLCTL_CONTEXT", "nope", 1);
   EXPECT_THAT(server({}), HasSubstr("$HULLCTL_CONTEXT: unknown context \"nope\""));
 }

@@ -156,7 +156,7 @@ TEST_F(Judge, ErrorsNameLineAndColumn) {
   error("a,b,b_x\n", "needs relation, colliding, distance, depth, or contact_time");
   error("a,b,colliding,A\n", "the header names \"a\" twice");
   error("a,b,b_qw,colliding\n", "a quaternion has four columns: b_qw b_qx b_qy b_qz");
-  error("a,b,colliding\ncube,cube\n", "answers.csv:2: the row has 2 cells, the header 3");
+  error("a,b,colliding\ncube,cube\n", "answers.csv:2: the row has 2 cells, but the header has 3");
   error("a,b,colliding\ncube,,1\n", "answers.csv:2: b is empty");
   error("a,b,colliding\ncube,cube,yes\n", "colliding: \"yes\" is not one of 0, 1, false, true");
   error("a,b,relation\ncube,cube,NEAR\n",
@@ -215,7 +215,7 @@ TEST_F(Judge, ThePlotShowsTheProgramNextToTheServer) {
   EXPECT_THAT(svg.str(), HasSubstr("the program, 50% wrong"));
   EXPECT_THAT(svg.str(), HasSubstr("hulld, proven bound"));
   EXPECT_THAT(JudgeText("a,b,b_x,distance\ncube,cube,3,2\n", {"--plot", chart}).err,
-              HasSubstr("--plot needs pairs at rest, and a column us"));
+              HasSubstr("--plot needs pairs at rest and a column us"));
 }
 
 }  // namespace judge_command_test

@@ -176,7 +176,7 @@ TEST_F(Continuous, IncompatibleOptionsAreRefused) {
     EXPECT_EQ(ran.code, 2) << ran.out;
     return ran.err;
   };
-  EXPECT_THAT(error("hinge\n0\n", {}), HasSubstr("pass two or more with --joints"));
+  EXPECT_THAT(error("hinge\n0\n", {}), HasSubstr("pass at least two with --joints"));
   EXPECT_THAT(error(kSwingPast, {"--separation"}), HasSubstr("--continuous finds first contacts"));
   EXPECT_THAT(error(kSwingPast, {"--tolerance", "0.1"}), HasSubstr("no --tolerance"));
   EXPECT_THAT(error("hinge\n0\n1e300\n", {}), HasSubstr("between waypoints 1 and 2; add"));
