@@ -108,7 +108,7 @@ constexpr Reading kGauges[] = {
     {"hulld_vertices", "Vertices of all hulls.",
      Get<&Measured::sizes, &RegistrySizes::vertex_count>},
     {"hulld_registry_lock_hold_max_seconds",
-     "Longest hold of the registry's lock within the last one to two minutes.",
+     "Longest time that the registry's lock was held within the last one to two minutes.",
      [](const Measured& now) { return std::chrono::duration<double>(now.longest_hold).count(); }},
     {"hulld_store_read_only", "1 while the store refuses changes, else 0.",
      Get<&Measured::commits, &CommitStatistics::failing>},

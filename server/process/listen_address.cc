@@ -50,7 +50,7 @@ absl::StatusOr<ListenAddress> ParseListenAddress(const std::string& text, const 
     if (address.path.starts_with("//")) address.path = address.path.substr(2);
     if (address.path.empty()) return Malformed(flag, text, "the socket has no path");
     if (address.path.size() >= sizeof(sockaddr_un::sun_path)) {
-      return Malformed(flag, text, "the path of a unix socket has at most 107 characters");
+      return Malformed(flag, text, "the path of a unix socket must have at most 107 characters");
     }
     return address;
   }
@@ -106,7 +106,7 @@ absl::Status BindFailure(const ListenAddress& address, int error, const std::str
                      flag, " (port 0 picks a free one)"));
   }
   const char* const advice =
-      error == EACCES ? "choose a port above 1023 with " : "give an address of this machine to ";
+      error == EACCES ? "choose a port above 1023 with " : "use an address of this machine with ";
   return absl::UnavailableError(absl::StrCat(what, cause, "; ", advice, flag));
 }
 
