@@ -53,7 +53,7 @@ std::vector<Include> IncludesUnder(const std::string& directory) {
 
 void ExpectNone(const std::string& directory, const std::vector<std::string>& forbidden_prefixes) {
   const std::vector<Include> includes = IncludesUnder(directory);
-  EXPECT_FALSE(includes.empty()) << directory << " has no includes: is the source tree there?";
+  EXPECT_FALSE(includes.empty()) << directory << " has no includes; does the source tree exist?";
   for (const Include& include : includes) {
     for (const std::string& prefix : forbidden_prefixes) {
       EXPECT_FALSE(include.header.starts_with(prefix))

@@ -44,7 +44,7 @@ plot() {
     svg) terminal="svg size 860,540 font 'Helvetica,13'" ;;
     png) terminal="pngcairo size 860,540 font 'Helvetica,10' background '$7'" ;;
     *)
-      echo "plot_summary.sh: svg, png, or check, not $format" >&2
+      echo "plot_summary.sh: unknown format $format; pass svg, png, or check" >&2
       exit 2
       ;;
   esac

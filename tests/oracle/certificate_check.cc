@@ -35,7 +35,7 @@ std::string FaultOf(const Certificate& certificate, Relation relation, const Wor
     differences.push_back(Subtract(points.a[a], points.b[b]));
   }
   if (relation == Relation::kSeparated) {
-    if (!differences.empty()) return "pairs though separated";
+    if (!differences.empty()) return "pairs, although separated";
     return DirectionFault(certificate, 1, points);
   }
   if (relation == Relation::kTouching) {
@@ -43,7 +43,7 @@ std::string FaultOf(const Certificate& certificate, Relation relation, const Wor
     if (LocateByPolarCone(differences) == OriginPosition::kOutside) return "0 is not between pairs";
     return DirectionFault(certificate, 0, points);
   }
-  if (!certificate.direction.empty()) return "a direction though overlapping";
+  if (!certificate.direction.empty()) return "a direction, although overlapping";
   if (differences.size() > 6) return "more than six pairs";
   if (LocateByPolarCone(differences) != OriginPosition::kInside) return "0 is not inside the pairs";
   return "";
@@ -119,7 +119,7 @@ std::string FaultOfRounded(const Certificate& certificate, Relation relation,
     differences.push_back(Subtract(points.a[i], points.b[j]));
   }
   if (relation == Relation::kOverlapping) {
-    if (!certificate.direction.empty()) return "a direction though overlapping";
+    if (!certificate.direction.empty()) return "a direction, although overlapping";
   } else {
     if (certificate.direction.size() != 3) return "no direction";
     const IntegerVector n = {certificate.direction[0], certificate.direction[1],
@@ -132,7 +132,7 @@ std::string FaultOfRounded(const Certificate& certificate, Relation relation,
     }
   }
   if (relation == Relation::kSeparated) {
-    return differences.empty() ? "" : "pairs though separated";
+    return differences.empty() ? "" : "pairs, although separated";
   }
   if (differences.empty()) return "no pairs";
   if (differences.size() > (relation == Relation::kTouching ? 4 : 6)) return "too many pairs";

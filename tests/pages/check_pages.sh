@@ -48,7 +48,7 @@ check_links() {
 check_paths() {
   local page=$1 path
   while read -r path; do
-    compgen -G "$path" >/dev/null || problem "$page: there is no $path"
+    compgen -G "$path" >/dev/null || problem "$page: $path does not exist"
   done < <(text "$page" | grep -oE '`(core|server|client|docker|proto|tests)/[A-Za-z0-9_./*-]*`' | tr -d '`')
 }
 
@@ -62,8 +62,8 @@ check_complete() {
   done
 }
 
-# Crontab blocks hold five time fields and a command, which cron cuts at a bare % and passes to sh.
-# Such a line in another kind of block would escape the check.
+# Crontab blocks contain five time fields and a command, which cron cuts at a bare % and passes to
+# sh. Such a line in another kind of block would escape the check.
 check_crontabs() {
   local page=$1 language line command
   while IFS=$'\t' read -r language line; do

@@ -23,7 +23,7 @@ if grep -q "$models" "$page" && [[ ! -d $models ]]; then
 fi
 
 for program in hulld hullctl; do
-  [[ -x $programs/$program ]] || { echo "there is no $programs/$program"; exit 2; }
+  [[ -x $programs/$program ]] || { echo "$programs/$program is not a program"; exit 2; }
 done
 
 rm -rf "$work" && mkdir -p "$work/steps" "$work/home" || exit 2

@@ -138,7 +138,7 @@ TEST(Compatibility, TheRecordedContractOfV1StillHolds) {
     return;
   }
   EXPECT_THAT(Missing(now, recorded), IsEmpty())
-      << "additions; record them, so that they stay: see the top of compatibility_test.cc";
+      << "unrecorded additions; record them as described at the top of compatibility_test.cc";
 }
 
 // Tests the check: each of these changes breaks a line, an addition breaks none.

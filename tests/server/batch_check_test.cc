@@ -140,7 +140,7 @@ TEST(BatchCheck, RefusesStatesOfOtherRevisions) {
   EXPECT_THAT(FaultOf({batch}), HasSubstr("of the store of c to one who wants at least 3"));
   batch.others.back() = SeenAt("c", 2);
   batch.others.back().store_revision = 1;
-  EXPECT_THAT(FaultOf({batch}), HasSubstr("revision 1 of the store of c tells of a later one"));
+  EXPECT_THAT(FaultOf({batch}), HasSubstr("revision 1 of the store of c contains a later one"));
 }
 
 }  // namespace batch_check_test

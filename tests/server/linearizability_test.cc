@@ -332,7 +332,7 @@ TEST(LinearizabilityCheck, RefusesDecreasingStoreRevisions) {
   Operation late = AnsweredOf(Kind::kProbe, 3, 4, 1);
   late.store_revision = 0;
   history.Record("a", late);
-  EXPECT_THAT(HistoryFault(history), HasSubstr("the store told revision 0 at tick 3"));
+  EXPECT_THAT(HistoryFault(history), HasSubstr("the store reported revision 0 at tick 3"));
 }
 
 // A hull with point 5 since tick 102, at revision 2, and a probe at ticks 200 to 201 with this
@@ -366,7 +366,7 @@ TEST(FreshnessCheck, ABoundedReadMayBeAsStaleAsItsBound) {
 }
 
 TEST(FreshnessCheck, RefusesAnAnswerStalerThanRequested) {
-  EXPECT_THAT(FaultOf(PastProbe(149, 150, 2, true)), HasSubstr("150 ns ago to one who wants"));
+  EXPECT_THAT(FaultOf(PastProbe(149, 150, 2, true)), HasSubstr("150 ns ago, requested with"));
   EXPECT_EQ(FaultOf(PastProbe(std::nullopt, 150, 2, true)), "");
 }
 

@@ -14,7 +14,7 @@ case $format in
   svg) terminal="svg size 960,440 font 'Helvetica,13' background 'white'" ;;
   png) terminal="pngcairo size 960,440 font 'Helvetica,11'" ;;
   *)
-    echo "plot_hull_cost.sh: svg or png, not $format" >&2
+    echo "plot_hull_cost.sh: unknown format $format; pass svg or png" >&2
     exit 2
     ;;
 esac

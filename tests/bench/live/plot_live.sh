@@ -14,7 +14,7 @@ case $format in
   svg) terminal="svg size 640,440 font 'Helvetica,13' background 'white'" ;;
   png) terminal="pngcairo size 640,440 font 'Helvetica,11'" ;;
   *)
-    echo "plot_live.sh: svg or png, not $format" >&2
+    echo "plot_live.sh: unknown format $format; pass svg or png" >&2
     exit 2
     ;;
 esac

@@ -6,15 +6,16 @@
 #
 # SUITES: commit questions questions64 bounded ingest fill start cold; all by default. fill creates
 # HULLS (1000000) hulls, in parts that take SECONDS_EACH. start and cold use the hulls of the last
-# fill, also of an earlier run: "start cold" alone measures another program over the same hulls.
+# fill, even one of an earlier run, so that "start cold" alone measures another program over the
+# same hulls.
 #
 # Starts a PostgreSQL in FOLDER, /tmp/hulld-bench-postgres by default, with fsync and
-# synchronous_commit on, and stops it; existing data is reused. Under root it runs as the user
-# postgres. MACHINE names the files, as in commit_MACHINE.csv; epyc_gcc12 by default. HULLD: a
-# program to measure instead of the one built here. UNDER: a command that wraps each measurement,
-# such as one that waits for an idle machine. SECONDS_EACH (60): the time per suite. Requires the
-# packages in docker/packages.txt under [build], [bench] and [test]. Client, servers and database
-# share the machine.
+# synchronous_commit on, and stops it; existing data is reused. If this script runs as root,
+# PostgreSQL runs as the user postgres. MACHINE names the files, as in commit_MACHINE.csv;
+# epyc_gcc12 by default. HULLD: a program to measure instead of the one built here. UNDER: a command
+# that wraps each measurement, such as one that waits for an idle machine. SECONDS_EACH (60): the
+# time per suite. Requires the packages in docker/packages.txt under [build], [bench] and [test].
+# Client, servers and database share the machine.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../../.."
 
@@ -71,8 +72,8 @@ for suite in "${suites[@]}"; do
       rm -f "$results/start_$machine.csv"
       measure start --out "$results/start_$machine.csv"
       ;;
-    *) echo "there is no suite $suite" >&2 && exit 2 ;;
+    *) echo "run_postgres_benchmark.sh: unknown suite $suite" >&2 && exit 2 ;;
   esac
 done
-# The tables of the pages show this machine.
+# The tables in the pages are about this machine.
 if [[ $machine == epyc_gcc12 ]]; then bash tests/bench/tables.sh --write "$machine"; fi

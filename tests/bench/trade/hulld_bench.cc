@@ -30,24 +30,25 @@ struct TradeArguments {
 
 void AddTradeOptions(CLI::App& command, TradeArguments& arguments) {
 #ifdef HULLD_HAVE_CLIENT
-  command.add_option("files", arguments.files,
-                     "Point files to take hulls of: obj, off, ply, xyz, csv, pcd, stl, gltf, dae");
+  command.add_option(
+      "files", arguments.files,
+      "Point files to build hulls from: obj, off, ply, xyz, csv, pcd, stl, gltf, dae");
   command.add_option("--hull", arguments.hull_ids, "Hulls of a running server, by ID");
-  command.add_option("--server", arguments.server, "The server that keeps them: host:port")
+  command.add_option("--server", arguments.server, "Server that stores them: host:port")
       ->capture_default_str();
 #endif
-  command.add_option("--questions", arguments.questions, "About how many questions to ask")
+  command.add_option("--questions", arguments.questions, "Approximate number of queries")
       ->check(CLI::Range(size_t{TradeQuestions::kLevels}, size_t{1000000}))
       ->capture_default_str();
-  command.add_option("--rounds", arguments.settings.rounds, "How often; the median counts")
+  command.add_option("--rounds", arguments.settings.rounds, "Number of rounds; times are medians")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
   command
       .add_option("--max-seconds", arguments.settings.max_seconds,
-                  "Leave a method out where one round takes longer")
+                  "Omit a method if one round takes longer")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  command.add_option("--csv", arguments.csv, "Write the numbers to this file");
+  command.add_option("--csv", arguments.csv, "Write the results to this file, as CSV");
   command.add_option("--plot", arguments.plot, "Write a plot to this file, as SVG");
 }
 
@@ -106,11 +107,11 @@ int RunTrade(const TradeArguments& arguments) {
 }
 
 int Main(int argc, char** argv) {
-  CLI::App app("Measures what each way to ask about collisions costs, and what it is worth");
+  CLI::App app("Measures the cost and the accuracy of each query method");
   app.require_subcommand(1);
   TradeArguments arguments;
   CLI::App* trade = app.add_subcommand(
-      "trade", "Speed against accuracy: each method's time, wrong answers and error in depth");
+      "trade", "Speed against accuracy: time, wrong answers, and errors of the depth, by method");
   AddTradeOptions(*trade, arguments);
   try {
     app.parse(argc, argv);

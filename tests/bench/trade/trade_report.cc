@@ -56,14 +56,14 @@ void WriteTradeTable(const Trade& trade, std::ostream& out) {
          row.depth ? Format("%.0e", row.depth->largest_error) : none);
   }
   const TradeRow& first = trade.rows.front();
-  out << "\nPer question; processor time on one thread, medians. ";
+  out << "\nPer query; processor time on one thread, medians. ";
   if (first.ordinary && first.near_contact) {
-    out << first.ordinary->questions << " ordinary questions, " << first.near_contact->questions
+    out << first.ordinary->questions << " ordinary queries, " << first.near_contact->questions
         << " near contact.\n";
   }
   out << "Lengths (tau, simplified, errors of the depth) are relative to the hulls' mean radius.\n"
-      << "Right is hulld's exact relation; an oracle that shares no code with it was asked "
-      << trade.checked << " of the " << trade.questions << " questions and differed "
+      << "The reference is hulld's exact relation; an oracle that shares no code with it answered "
+      << trade.checked << " of the " << trade.questions << " queries and differed "
       << trade.differing << " times.\n";
 }
 

@@ -130,8 +130,8 @@ std::string ExactFault(const Scene& scene, const IntegerVector& n, Relation rela
   const Support support = SupportAlong(scene, n);
   if (relation == Relation::kSeparated && support.gap <= 0) return "does not separate strictly";
   if (relation == Relation::kTouching && support.gap != 0) return "has a gap that is not zero";
-  if (support.argmax_a != axis.feature_a.vertices) return "is extreme in A elsewhere";
-  if (support.argmin_b != axis.feature_b.vertices) return "is extreme in B elsewhere";
+  if (support.argmax_a != axis.feature_a.vertices) return "is extreme at other vertices of A";
+  if (support.argmin_b != axis.feature_b.vertices) return "is extreme at other vertices of B";
   return "";
 }
 
@@ -155,11 +155,13 @@ std::string RoundedFault(const Scene& scene, const SeparatingAxis& axis) {
   if (support.gap < -slack) return "does not separate";
   const Integer max_a = oracle::Dot(n, scene.world.a[support.argmax_a[0]]);
   for (uint32_t v : axis.feature_a.vertices) {
-    if (max_a - oracle::Dot(n, scene.world.a[v]) > slack) return "is extreme in A elsewhere";
+    if (max_a - oracle::Dot(n, scene.world.a[v]) > slack)
+      return "is extreme at other vertices of A";
   }
   const Integer min_b = oracle::Dot(n, scene.world.b[support.argmin_b[0]]);
   for (uint32_t v : axis.feature_b.vertices) {
-    if (oracle::Dot(n, scene.world.b[v]) - min_b > slack) return "is extreme in B elsewhere";
+    if (oracle::Dot(n, scene.world.b[v]) - min_b > slack)
+      return "is extreme at other vertices of B";
   }
   return "";
 }
@@ -178,11 +180,11 @@ std::string FeatureFault(const Feature& feature, const Hull& hull) {
   if (feature.vertices.empty()) return "has no vertices";
   if (std::adjacent_find(feature.vertices.begin(), feature.vertices.end(),
                          std::greater_equal<>()) != feature.vertices.end()) {
-    return "has vertices that do not ascend";
+    return "has vertices that are not in ascending order";
   }
   if (feature.vertices.back() >= hull.vertices().size()) return "has a vertex out of range";
   if (feature.facet != FacetOf(hull, feature.vertices)) {
-    return "names a facet iff its vertices are just those of that facet: violated";
+    return "names a facet that does not have exactly its vertices, or omits one that does";
   }
   return "";
 }
@@ -231,7 +233,7 @@ testing::AssertionResult AxisIsValid(const Hull& a, const Pose& X_WA, const Hull
   const bool wanted = answer.relation != Relation::kOverlapping && !a.empty() && !b.empty();
   if (wanted != answer.axis.has_value()) {
     return testing::AssertionFailure()
-           << (wanted ? "no axis although " : "an axis although ") << Name(answer.relation);
+           << (wanted ? "no axis, although " : "an axis, although ") << Name(answer.relation);
   }
   if (!wanted) return testing::AssertionSuccess();
   const Scene scene = {a, b,

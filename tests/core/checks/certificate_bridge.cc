@@ -42,7 +42,8 @@ testing::AssertionResult CertificateIsValid(const Hull& a, const Pose& X_WA, con
                                             const Pose& X_WB, const Answer& answer) {
   const bool expected = !a.empty() && !b.empty();
   if (answer.certificate.has_value() != expected) {
-    return testing::AssertionFailure() << "a certificate is there iff no hull is empty: violated";
+    return testing::AssertionFailure()
+           << "the certificate is missing, or exists although a hull is empty";
   }
   if (!expected) return testing::AssertionSuccess();
   const oracle::WorldPoints points = oracle::PlaceInWorld(ToOracle(a.vertices()), ToOracle(X_WA),

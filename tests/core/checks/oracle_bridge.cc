@@ -91,7 +91,8 @@ testing::AssertionResult SameBits(const Hull& actual, const Hull& expected) {
       }
     }
   }
-  if (!(a == b)) return testing::AssertionFailure() << "same vertices, other facets or edges";
+  if (!(a == b))
+    return testing::AssertionFailure() << "same vertices, but different facets or edges";
   if (actual.max_abs_coordinate() != expected.max_abs_coordinate()) {
     return testing::AssertionFailure() << "max_abs_coordinate differs";
   }

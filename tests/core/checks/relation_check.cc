@@ -20,9 +20,10 @@ std::string AnalysisFault(const Hull& a, const Hull& b, const Answer& answer) {
     if (analysis.axes_total != expected) return "axes_total is not F + F + E E";
   }
   const bool has_axis = answer.relation != Relation::kOverlapping && !a.empty() && !b.empty();
-  if (has_axis != analysis.stage.has_value()) return "stage is there iff an axis is: violated";
+  if (has_axis != analysis.stage.has_value())
+    return "stage is set without an axis, or missing with one";
   if (has_axis != analysis.axis_index.has_value())
-    return "axis_index is there iff an axis is: violated";
+    return "axis_index is set without an axis, or missing with one";
   if (!has_axis) {
     if (!a.empty() && !b.empty() && analysis.axes_tested != analysis.axes_total) {
       return "overlapping without a test of every axis";
@@ -48,7 +49,7 @@ testing::AssertionResult RelationCheck::Ask(const Hull& a, const Pose& X_WA, con
     testing::AssertionResult result = AskOnce(a, X_WA, b, X_WB, expected, method);
     if (!result) return result;
     result = AskOnce(b, X_WB, a, X_WA, expected, method);
-    if (!result) return result << " (the hulls swapped)";
+    if (!result) return result << " (with the hulls swapped)";
   }
   return testing::AssertionSuccess();
 }
@@ -77,7 +78,7 @@ testing::AssertionResult RelationCheck::AskOnce(const Hull& a, const Pose& X_WA,
     const absl::StatusOr<Answer> plain = CheckCollision(a, X_WA, b, X_WB);
     if (!plain.ok()) return failure() << plain.status();
     if (plain->relation != expected) {
-      return failure() << Name(plain->relation) << " where nothing else is wanted, expected "
+      return failure() << Name(plain->relation) << " if only the relation is requested, expected "
                        << Name(expected);
     }
     const testing::AssertionResult certificate = CertificateIsValid(a, X_WA, b, X_WB, *answer);

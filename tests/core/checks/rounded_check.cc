@@ -147,7 +147,7 @@ testing::AssertionResult RoundedCheck::Ask(const RoundedShape& a, const RoundedS
   const double goal = 2e-12 * (a.hull.max_abs_coordinate() + b.hull.max_abs_coordinate() +
                                a.radius + b.radius + std::abs(value)) +
                       0x1p-1073;
-  if (!(bound <= goal)) return failure() << "bound " << bound << " misses the goal";
+  if (!(bound <= goal)) return failure() << "bound " << bound << " exceeds the goal";
   if (answer->axis.has_value() != (sign >= 0)) return failure() << "axis";
   if (auto result = WitnessIsValid(a, b, *answer); !result) return failure() << result.message();
   if (auto result = CertificateIsValid(a, b, *answer, RelationOf(sign)); !result) {

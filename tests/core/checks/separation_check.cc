@@ -102,7 +102,7 @@ testing::AssertionResult SeparationCheck::Ask(const Hull& a, const Pose& X_WA, c
   ++(exact ? exact_ : float_);
   const double goal = max_error.value_or(
       2e-12 * (a.max_abs_coordinate() + b.max_abs_coordinate() + std::abs(value)));
-  if (!exact && !(bound <= goal)) return failure() << "bound " << bound << " misses the goal";
+  if (!exact && !(bound <= goal)) return failure() << "bound " << bound << " exceeds the goal";
   if (const auto result = WitnessIsValid(q, *answer); !result) return failure() << result.message();
   // Equal hulls at equal poses: the query is its own mirror image.
   const bool symmetric = X_WA.q == X_WB.q && X_WA.t == X_WB.t && SameBits(a, b);
@@ -116,7 +116,7 @@ testing::AssertionResult SeparationCheck::Ask(const Hull& a, const Pose& X_WA, c
     }
     if (cleared.separation->value != value) return failure() << "clearance moves the separation";
     if (!symmetric && !SameMirrored(cleared, CheckCollision(b, X_WB, a, X_WA, options).value())) {
-      return failure() << "the hulls swapped give another answer";
+      return failure() << "swapping the hulls changes the answer";
     }
   }
   return testing::AssertionSuccess();

@@ -3,7 +3,7 @@
 
   prove_bounds.py prove CONSTANTS SCRIPT.g    proves the script, and checks that its mutants fail
   prove_bounds.py expand CONSTANTS SCRIPT.g   prints the script as Gappa reads it
-  prove_bounds.py complete HEADER FOLDER      checks that each bound of the header has its proof: in
+  prove_bounds.py complete HEADER FOLDER      checks that each bound of the header has a proof: in
                                               a script of the folder, or by hand in its README.md
 
 CONSTANTS: a program that prints the C++ constants, one name and hexadecimal double per line.
@@ -97,11 +97,11 @@ def mutants(text, constants):
 def prove(constants, script):
     text = script.read_text()
     if not is_proved(expand(text, constants)):
-        sys.exit(f'{script.name}: Gappa finds no proof with the constants of C++')
+        sys.exit(f'{script.name}: Gappa finds no proof with the C++ constants')
     mutated = set()
     for name, value in mutants(text, constants):
         if is_proved(expand(text, constants | {name: value})):
-            sys.exit(f'{script.name}: holds with {name} = {value.hex()}, too: what does it prove?')
+            sys.exit(f'{script.name}: also holds with {name} = {value.hex()}, so it proves nothing')
         mutated.add(name)
         print(f'{script.name}: {name} = {constants[name].hex()} proved, {value.hex()} refused')
     if not mutated:
@@ -123,9 +123,9 @@ def check_complete(header, folder):
             sys.exit(f'{name} has neither a script nor a proof by hand in {folder}/README.md')
     for name in sorted(by_hand):
         if name not in bounds or name in proved:
-            sys.exit(f'{folder}/README.md proves {name} by hand: there is no such need')
+            sys.exit(f'{folder}/README.md proves {name} by hand, although it needs no such proof')
     if not bounds:
-        sys.exit(f'{header} holds no bound that this script can read')
+        sys.exit(f'{header} contains no bound that this script can read')
     print(f'{len(bounds & proved)} bounds by Gappa, {len(by_hand)} by hand')
 
 

@@ -100,7 +100,7 @@ class Determinism : public testing::Test {
 
 TEST_F(Determinism, SimdPathsGiveTheSameAnswers) {
   const OnPath fast(BestSimdPath());
-  if (BestSimdPath() == SimdPath::kPortable) GTEST_SKIP() << "this machine has one SIMD path only";
+  if (BestSimdPath() == SimdPath::kPortable) GTEST_SKIP() << "this machine has only one SIMD path";
   for (size_t i = 0; i < suite_.queries.size(); ++i) {
     const Answer expected = Ask(suite_.queries[i]);
     const OnPath portable(SimdPath::kPortable);
@@ -112,7 +112,7 @@ TEST_F(Determinism, SimdPathsGiveTheSameAnswers) {
 
 TEST_F(Determinism, SimdPathsBuildTheSameHulls) {
   const OnPath fast(BestSimdPath());
-  if (BestSimdPath() == SimdPath::kPortable) GTEST_SKIP() << "this machine has one SIMD path only";
+  if (BestSimdPath() == SimdPath::kPortable) GTEST_SKIP() << "this machine has only one SIMD path";
   std::vector<std::vector<Vector>> clouds;
   for (const Extreme& extreme : Extremes()) clouds.push_back(extreme.make(600));
   Random random(TestSeed(1701));

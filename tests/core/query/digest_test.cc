@@ -190,7 +190,7 @@ void DigestAnswers(std::span<const Hull> hulls, Digest& digest) {
     ask(a, X_WA, b, LatticePose(random));
   }
   for (int relation = 0; relation < 3; ++relation) {
-    EXPECT_GT(counts[relation], 5u) << "a relation is hardly met";
+    EXPECT_GT(counts[relation], 5u) << "a relation occurs too rarely";
   }
 }
 
@@ -321,7 +321,7 @@ void DigestBodies(Digest& digest) {
     }
   }
   for (int relation = 0; relation < 3; ++relation) {
-    EXPECT_GT(counts[relation], 5u) << "a relation of bodies is hardly met";
+    EXPECT_GT(counts[relation], 5u) << "a relation of bodies occurs too rarely";
   }
 }
 
@@ -387,7 +387,7 @@ class DigestTest : public testing::TestWithParam<SimdPath> {};
 
 TEST_P(DigestTest, IsTheSameOnEveryProcessor) {
   const SimdPath before = CurrentSimdPath();
-  if (!UseSimdPath(GetParam())) GTEST_SKIP() << "this machine has no such instructions";
+  if (!UseSimdPath(GetParam())) GTEST_SKIP() << "this machine does not support these instructions";
   const Digests digests = Compute();
   UseSimdPath(before);
   std::map<std::string, uint64_t> hashes;

@@ -191,7 +191,7 @@ FileVerdict CheckScene(std::string_view content) {
   for (const uint32_t index : *pairs) {
     if (index >= size) return {"a pair index is out of range", false};
   }
-  return {pairs->size() % 2 == 0 ? "" : "half a pair", true};
+  return {pairs->size() % 2 == 0 ? "" : "a pair is incomplete", true};
 }
 
 // The message must round-trip bit by bit, including NaN.
@@ -243,7 +243,7 @@ FileVerdict CheckUrdf(std::string_view content) {
     if ((link.parent_joint < 0) != (i == 0)) return {"the first link is not the only root", false};
     if (i == 0) continue;
     const RobotJoint& joint = robot->joints[static_cast<size_t>(link.parent_joint)];
-    if (joint.child != i || joint.parent >= i) return {"a child before its parent", false};
+    if (joint.child != i || joint.parent >= i) return {"a joint precedes its parent", false};
   }
   // Mimic chains terminate, and every link has a pose.
   const std::vector<JointValue> values = AllJointValues(*robot, RestValues(*robot));

@@ -124,7 +124,7 @@ std::string CheckColumns(const v1::Wanted& wanted, double tolerance,
     std::string finding = CheckRow(wanted, tolerance, columns, row);
     if (!finding.empty()) return finding;
   }
-  return causes.empty() ? "" : "a problem names a row that the message does not have";
+  return causes.empty() ? "" : "a problem names a row that is not in the message";
 }
 
 // Checks that facets name existing vertices.
@@ -147,8 +147,8 @@ std::string CheckSceneTotals(const v1::SceneTotals& totals, const v1::SceneTotal
       totals.overlapping() != counted.overlapping() ||
       totals.within_tolerance() != counted.within_tolerance() ||
       totals.failed() != counted.failed() || totals.candidates() > totals.pairs()) {
-    return "the totals do not match the rows: " + totals.ShortDebugString() + " but counted were " +
-           counted.ShortDebugString();
+    return "the totals do not match the rows: " + totals.ShortDebugString() +
+           " but the rows have " + counted.ShortDebugString();
   }
   return {};
 }
@@ -162,7 +162,7 @@ std::string CheckLimitedTotals(uint32_t limit, const v1::SceneTotals& totals,
       counted.failed() > totals.failed() || totals.candidates() > totals.pairs()) {
     return absl::StrCat("a scene with limit ", limit,
                         " has more rows than its totals count: ", totals.ShortDebugString(),
-                        " but counted were ", counted.ShortDebugString());
+                        " but the rows have ", counted.ShortDebugString());
   }
   return {};
 }
@@ -288,7 +288,7 @@ std::string CheckPair(const v1::CheckCollisionRequest& request,
       (response.has_axis() && !wanted.axis()) || (response.has_witness() && !wanted.witness()) ||
       (response.has_normal() && !wanted.normal()) ||
       (response.has_certificate() && !wanted.certificate())) {
-    return "the fields of the answer do not match the wanted ones";
+    return "the fields of the answer do not match the requested ones";
   }
   if (wanted.separation()) {
     std::string finding =
@@ -312,7 +312,7 @@ std::string CheckBatch(const v1::BatchCheckCollisionsRequest& request,
     std::string finding =
         CheckProblems(part.placement_problems(), PlacementCount(request), &problems);
     if (!finding.empty()) return finding;
-    if (part.first_pair() != next) return "ranges of pairs do not follow each other";
+    if (part.first_pair() != next) return "the ranges of pairs are not consecutive";
     const auto pair_of = [&](int row) { return next + static_cast<uint64_t>(row); };
     const auto has_problem = [&](int row) {
       const int pair = static_cast<int>(pair_of(row));
@@ -345,7 +345,7 @@ std::string CheckScene(const v1::FindCollisionsRequest& request,
   v1::SceneTotals counted;
   SceneKey before(false, -std::numeric_limits<double>::infinity(), -1, -1);
   for (const v1::FindCollisionsResponse& part : parts.subspan(1)) {
-    if (part.pairs_size() % 2 != 0) return "half a pair";
+    if (part.pairs_size() % 2 != 0) return "a pair is incomplete";
     for (int row = 0; 2 * row < part.pairs_size(); ++row) {
       const SceneKey key = KeyOf(request, part, row);
       const auto [unanswered, separation, a, b] = key;
@@ -417,7 +417,7 @@ std::string AppendCheck::Received(const v1::AppendPointsResponse& response) {
     opened_ = response.opened();
     hull_ = opened_.hull();
     revision_ = opened_.hull().revision();
-    if (opened_.writer_id().empty()) return "the server chose no writer";
+    if (opened_.writer_id().empty()) return "the server assigned no writer ID";
     return CheckHullInfo(opened_.hull());
   }
   if (!response.has_ack()) return "`opened` is received twice";
@@ -430,7 +430,7 @@ std::string AppendCheck::Received(const v1::AppendPointsResponse& response) {
       ack.durability() == v1::DURABILITY_UNSPECIFIED) {
     return "an ack without outcome or durability";
   }
-  if (ack.hull_revision() < revision_) return "the revision of a hull fell";
+  if (ack.hull_revision() < revision_) return "the revision of a hull decreased";
   revision_ = ack.hull_revision();
   received_ += ack.counts().received();
   hull_.set_revision(ack.hull_revision());

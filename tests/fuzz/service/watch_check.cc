@@ -45,7 +45,7 @@ std::string HullWatchCheck::Received(const v1::WatchHullsResponse& response) {
     is_synced_ = false;
     is_restarted_ = true;
   } else if (response.header().revision() < header_.revision()) {
-    return "the revision of a watch falls";
+    return "the revision of a watch decreases";
   }
   if (response.synced() && is_synced_) return "a watch reports `synced` twice";
   header_ = response.header();
@@ -131,7 +131,7 @@ std::string CollisionWatchCheck::Received(const v1::WatchCollisionsResponse& res
     return absl::StrCat("update ", response.update(), " is reported after ", told_update_,
                         "; updates sent: ", sent_);
   }
-  if (response.header().revision() < revision_) return "the revision of a watch falls";
+  if (response.header().revision() < revision_) return "the revision of a watch decreases";
   revision_ = response.header().revision();
   told_update_ = response.update();
   for (const auto* const hulls : {&response.hulls(), &response.piece_hulls()}) {

@@ -71,7 +71,7 @@ class HostileRequest : public ::testing::Test {
   // Many concurrent callers: limits the server's peak memory above its idle memory.
   static void ExpectLittleMemory(const std::vector<std::string>& settings,
                                  grpc::StatusCode expected) {
-    if (kKeepsWhatWasFreed) GTEST_SKIP() << "AddressSanitizer keeps what was freed";
+    if (kKeepsWhatWasFreed) GTEST_SKIP() << "AddressSanitizer retains freed memory";
     constexpr int kCallers = 64;
     std::vector<std::string> arguments = {"--store",     "memory",       "--listen",
                                           "127.0.0.1:0", "--log-format", "json"};

@@ -150,7 +150,7 @@ TEST(RequestMemory, IsTakenAndGivenBack) {
     RequestMemory::Share moved = std::move(share);
     EXPECT_EQ(share.bytes(), 0u);  // NOLINT(bugprone-use-after-move): moving empties it
     EXPECT_EQ(moved.bytes(), 600u);
-    ASSERT_TRUE(memory.Take(900, moved).ok()) << "in place of what it held";
+    ASSERT_TRUE(memory.Take(900, moved).ok()) << "in place of its previous amount";
     EXPECT_EQ(memory.taken_bytes(), 900u);
   }
   EXPECT_EQ(memory.taken_bytes(), 0u);

@@ -217,7 +217,8 @@ TEST_F(RegistryInterleaving, UncommittedChangesAreInvisible) {
     Gate gate;
     store_.before_commit.Set([&]() -> absl::Status {
       gate.Stop();
-      return fails ? absl::UnavailableError("the disk is gone for a moment") : absl::OkStatus();
+      return fails ? absl::UnavailableError("the disk is temporarily unavailable")
+                   : absl::OkStatus();
     });
     const auto x = static_cast<double>(sequence);
     // Two are in flight, the second built on the first.
@@ -392,7 +393,7 @@ TEST_F(RegistryInterleaving, AChunkIsNotBuiltOnOneThatWasRefused) {
   store_.before_commit.Set([&]() -> absl::Status {
     committing.set_value();
     fail.get_future().wait();
-    return absl::UnavailableError("the disk is gone for a moment");
+    return absl::UnavailableError("the disk is temporarily unavailable");
   });
   auto first = StartAppend(refused, 1, {{0, 0, 0}});
   committing.get_future().wait();

@@ -37,7 +37,7 @@ class VastStore : public MemoryStore {
   absl::StatusOr<FoundRecords> FindRecords(std::span<const std::string> ids) override {
     ++questions;
     records += ids.size();
-    if (is_gone) return absl::UnavailableError("it cannot be asked");
+    if (is_gone) return absl::UnavailableError("the store cannot be queried");
     FoundRecords found;
     found.revision = kHulls;
     for (const std::string& id : ids) {

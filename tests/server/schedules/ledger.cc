@@ -130,7 +130,7 @@ std::string Ledger::KeepBody(const Change& change, State& state) {
 
 std::string Ledger::KeepChunk(const Change& change, State& state) {
   const HullRecord& record = change.hull.record;
-  if (!state.exists) return "there is no hull for the chunk";
+  if (!state.exists) return "the hull of the chunk does not exist";
   if (record.create_revision != state.record.create_revision) return "the hull has been replaced";
   uint64_t& last = state.sequences[WriterOf(change.writer->writer_id)];
   if (change.writer->sequence != last + 1) {

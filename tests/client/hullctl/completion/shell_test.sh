@@ -10,7 +10,7 @@ programs=$(cd "$1" && pwd) || exit 2
 kind=$2
 program=$kind
 [[ $kind == terminal ]] && program=script
-command -v "$program" >/dev/null || { echo "skipped: there is no $program"; exit 77; }
+command -v "$program" >/dev/null || { echo "skipped: $program is not installed"; exit 77; }
 
 work=$(mktemp -d)
 server=

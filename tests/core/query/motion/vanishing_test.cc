@@ -128,7 +128,7 @@ testing::AssertionResult IsRight(const OwnMoving& a, const OwnMoving& b,
   const absl::StatusOr<bool> near =
       PairAt(moving_a, moving_b, contact.separated_until).IsWithin(resolution, {});
   return near.ok() && *near ? testing::AssertionSuccess()
-                            : testing::AssertionFailure() << "not decided, though far apart";
+                            : testing::AssertionFailure() << "undecided, although far apart";
 }
 
 bool IsRefusal(const absl::Status& status) {

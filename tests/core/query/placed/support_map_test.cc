@@ -207,7 +207,7 @@ TEST(SupportMap, ListedPointsHaveTheSameHull) {
 
 TEST(SupportMap, EveryInstructionSetReturnsTheSameBits) {
   const SimdPath best = BestSimdPath();
-  if (best == SimdPath::kPortable) GTEST_SKIP() << "this machine has one SIMD path only";
+  if (best == SimdPath::kPortable) GTEST_SKIP() << "this machine has only one SIMD path";
   Random random(TestSeed(935));
   for (const NamedSet& set : Sets(random)) {
     UseSimdPath(best);
@@ -266,7 +266,8 @@ TEST(SupportMap, PreparationPollsOftenAndStopsAtOnce) {
   uint64_t most = UINT64_MAX;
   const std::function<bool()> should_stop = [&] { return ++polls >= most; };
   EXPECT_FALSE(SupportMap(polygon, should_stop).stopped());
-  // Each face filters all points some 30 times, in steps of 4096 points, with a poll in 1024 steps.
+  // Each face filters all points about 30 times, in steps of 4096 points, with a poll in 1024
+  // steps.
   EXPECT_GT(polls, 10);
   for (most = 1; most <= 8; most *= 2) {
     polls = 0;

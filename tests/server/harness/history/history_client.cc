@@ -268,7 +268,7 @@ bool HistoryClient::AppendAtOnce(const std::string& hull_id) {
     const size_t first = next;
     while (next < sent.size() && sent[next].sequence <= ack->sequence()) ++next;
     if (next == first) {
-      ADD_FAILURE() << "sequence " << ack->sequence() << " of " << hull_id << " comes twice";
+      ADD_FAILURE() << "sequence " << ack->sequence() << " of " << hull_id << " occurs twice";
       streams_.erase(hull_id);
       return true;
     }
@@ -375,7 +375,7 @@ bool HistoryClient::Mesh(const std::string& hull_id) {
     const auto& xyz = part.vertices().xyz();
     for (int i = 0; i + 2 < xyz.size(); i += 3) {
       const int point = NumberOf(xyz.data() + i);
-      EXPECT_GE(point, 0) << "hull " << hull_id << " has a vertex that nobody sent";
+      EXPECT_GE(point, 0) << "hull " << hull_id << " has a vertex that no client sent";
       operation.points |= PointSet{1} << point;
     }
   }

@@ -139,7 +139,7 @@ std::vector<Seen> HistoryClient::SeenIn(const JointQuery& asked, const JointAnsw
       continue;
     }
     if (i >= told.hulls.size()) {
-      ADD_FAILURE() << "an answer does not tell of placement " << i;
+      ADD_FAILURE() << "an answer does not mention placement " << i;
       return {};
     }
     TakeVersion(told.hulls[i], told.header, seen);
@@ -322,13 +322,13 @@ bool HistoryClient::List(
       all.push_back(seen);
     }
     EXPECT_TRUE(row == page.rows.end())
-        << "a list after " << after << " tells of " << row->hull_id << ", which is not next";
+        << "a list after " << after << " contains " << row->hull_id << ", which is not next";
     RecordSeveral(operation, page.header, std::move(all));
     if (is_last) return true;
     token = page.next_token;
     if (!page.rows.empty()) after = page.rows.back().hull_id;
   }
-  ADD_FAILURE() << "a list comes to no end after " << after;
+  ADD_FAILURE() << "a list does not end after " << after;
   return true;
 }
 

@@ -103,26 +103,27 @@ uint64_t ChangedAt(const Operation& operation) {
 std::string FreshnessFault(const Operation& operation) {
   if (!IsRead(operation) || operation.outcome != Outcome::kOk) return "";
   if (operation.max_staleness.has_value() && operation.staleness > *operation.max_staleness) {
-    return absl::StrCat("an answer of ", operation.staleness, " ns ago to one who wants at most ",
-                        *operation.max_staleness, " ns: ", Describe(operation));
+    return absl::StrCat("an answer of ", operation.staleness,
+                        " ns ago, requested with a staleness of at most ", *operation.max_staleness,
+                        " ns: ", Describe(operation));
   }
   if (operation.store_revision < operation.at_least_revision) {
     return absl::StrCat("an answer of revision ", operation.store_revision,
-                        " of the store to one who wants at least ", operation.at_least_revision,
-                        ": ", Describe(operation));
+                        " of the store, requested with at least revision ",
+                        operation.at_least_revision, ": ", Describe(operation));
   }
   for (const Seen& other : operation.others) {
     if (other.store_revision > 0 && other.revision > other.store_revision) {
       return absl::StrCat("an answer of revision ", other.store_revision, " of the store of ",
-                          other.hull_id, " tells of a later one: ", Describe(operation));
+                          other.hull_id, " contains a later one: ", Describe(operation));
     }
     // The store of a missing object may be unknown.
     const bool is_there = !other.is_missing && other.missing_piece.empty();
     if (other.store_revision == 0 && !is_there) continue;
     if (other.store_revision >= other.at_least_revision) continue;
     return absl::StrCat("an answer of revision ", other.store_revision, " of the store of ",
-                        other.hull_id, " to one who wants at least ", other.at_least_revision, ": ",
-                        Describe(operation));
+                        other.hull_id, ", requested with at least revision ",
+                        other.at_least_revision, ": ", Describe(operation));
   }
   return "";
 }
@@ -378,7 +379,7 @@ std::string StoreRevisionFault(const HullHistory& history, const std::string& st
                             " and to one of ", hull_id);
       }
       if (operation.store_revision < revision) {
-        return absl::StrCat("the store told revision ", operation.store_revision,
+        return absl::StrCat("the store reported revision ", operation.store_revision,
                             " with a change of revision ", revision);
       }
     }
@@ -392,8 +393,8 @@ std::string StoreRevisionFault(const HullHistory& history, const std::string& st
       greatest = std::max(greatest, next->second);
     }
     if (revision < greatest) {
-      return absl::StrCat("the store told revision ", revision, " at tick ", tick,
-                          " after it told ", greatest);
+      return absl::StrCat("the store reported revision ", revision, " at tick ", tick,
+                          " after it reported ", greatest);
     }
   }
   return "";

@@ -50,7 +50,7 @@ class HullTableTest : public ::testing::Test {
       locked.Lock();
     }
   }
-  // Longer than a hull must be unused.
+  // Long enough for unused hulls to be put to rest.
   void PassTime() {
     for (int i = 0; i < 2; ++i) RestIdle(locked_, table_);
   }
@@ -76,7 +76,7 @@ TEST_F(HullTableTest, AHullComesBackFromRestAsItWas) {
     EXPECT_EQ(table_.Find("a"), hull);
     hull->SetBox({{1, 2, 3}, {4, 5, 6}});
     GoRound();
-    EXPECT_TRUE(IsAwake("a")) << "while someone holds it";
+    EXPECT_TRUE(IsAwake("a")) << "while it is in use";
   }
   GoRound();
   EXPECT_FALSE(IsAwake("a"));

@@ -79,7 +79,7 @@ class PostgresShared : public PostgresTest {
         "SELECT 1 FROM pg_stat_activity WHERE pid <> pg_backend_pid() AND " + condition;
     while (Ask(ask).empty() == is_some) {
       if (std::chrono::steady_clock::now() > end) {
-        ADD_FAILURE() << (is_some ? "no session comes to " : "a session stays at ") << condition;
+        ADD_FAILURE() << (is_some ? "no session reaches " : "a session remains at ") << condition;
         return;
       }
       std::this_thread::yield();
