@@ -84,8 +84,8 @@ build() {
 run_tests() {
   local preset=$1 code=0
   shift
-  # Many tests wait for a disk or another process: with one more than there are processors, a third
-  # of the processor time was idle.
+  # Many tests wait for a disk or another process: with one more job than processors, a third of the
+  # processor time was idle.
   ctest --preset "$preset" --parallel $((2 * jobs)) "$@" | tee "build/$preset/ctest.log" || code=1
   grep -hE '^\[  SKIPPED \] [^ ]+( \(|$)' "build/$preset/Testing/Temporary/LastTest.log" | sort -u
   echo "slowest:"
@@ -107,7 +107,7 @@ check_includes() {
       { echo "{} lacks an include"; exit 255; }' _ "$headers"
 }
 
-# Tests leave a third of the processor idle, so a second check runs beside them. in_background NAME COMMAND... starts a command;
+# Tests leave a third of the processor idle, so a second check runs concurrently. in_background NAME COMMAND... starts a command;
 # finish NAME waits for it, prints its output, and returns its exit code.
 declare -A background
 in_background() {
@@ -133,7 +133,7 @@ by_memory=$((${available_kib:-1572864} / 1572864))
 ((jobs > by_memory)) && jobs=$((by_memory > 0 ? by_memory : 1))
 
 if [[ $install == yes ]]; then
-  # Only root can install: others learn of all missing packages at once.
+  # Only root can install packages; for other users, all missing packages are listed at once.
   ((EUID == 0)) || sections+=("${later_sections[@]}")
   run_part "packages" bash docker/packages.sh install "${sections[@]}" || exit 1
 fi

@@ -10,7 +10,7 @@
 
 namespace hulld::bench {
 
-// Random numbers equal on every platform, unlike those of the standard distributions.
+// Random numbers that are the same on every platform, unlike those of the standard distributions.
 class Random {
  public:
   explicit Random(uint64_t seed) : engine_(seed) {}

@@ -50,7 +50,7 @@ std::string WorkloadAndLibrary(const std::string& name) {
   return name.substr(workload, library - workload).append(",").append(name.substr(library + 1));
 }
 
-// Writes a count in full, a measurement in six digits.
+// Writes a count in full, and a measurement with six digits.
 void Write(std::ostream& out, double value) {
   if (value == std::floor(value) && std::abs(value) < 1e15) {
     out << static_cast<int64_t>(value);

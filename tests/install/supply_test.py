@@ -3,7 +3,7 @@
 
 The table of docker/README.md names every package of the sections build and run of
 docker/packages.txt and no other. The SBOM that docker/sbom.sh prints is valid JSON, names the
-libraries that the programs link, and holds the versions in dpkg's database.
+libraries that the programs link, and contains the versions in dpkg's database.
 """
 
 import json

@@ -88,7 +88,8 @@ OriginPosition PositionAt(std::span<const RationalVector> differences, const Rat
   return LocateInDifference(points, origin);
 }
 
-// Adds the times in [0, 1] at which t d lies in the affine hull of points, if one time does.
+// Adds each time in [0, 1] at which t d crosses a point, or the line or plane of two or three of
+// the points.
 void AddEvents(std::span<const IntegerVector> points, const IntegerVector& d,
                std::set<Rational>& events) {
   const auto add = [&](const Integer& numerator, const Integer& denominator) {

@@ -154,7 +154,7 @@ OriginPosition LocateInDifference(std::span<const IntegerVector> a,
   if (!HasNonnegativeSolution(columns, {0, 0, 0, 1, 1})) return OriginPosition::kOutside;
 
   // The cone of the differences: equal sums of weights, of any size. It is R^3, and the origin is
-  // inside, iff it holds four vectors that positively span R^3.
+  // inside, iff it contains four vectors that positively span R^3.
   for (std::vector<Integer>& column : columns) {
     column[3] -= column[4];
     column.pop_back();

@@ -1,12 +1,12 @@
 # Splits a page into the steps for run_page.sh, each in files of the directory `out`:
 #
 #   NNN.file      line 1: the name of a file; the rest: its contents
-#   NNN.command   a command of a console block; NNN.expected holds its output in the page
+#   NNN.command   a command of a console block; NNN.expected contains its output in the page
 #   NNN.script    a block of sh
 #   NNN.skipped   line 1: the reason a block is not run
 #
 # An HTML comment on the line before a block marks special blocks: <!-- file: NAME --> and <!-- not
-# run: REASON -->. NNN.place holds the page's name and the line of the step.
+# run: REASON -->. NNN.place contains the page's name and the line of the step.
 function open_step(kind) {
   step = sprintf("%s/%03d", out, ++steps)
   printf "%s:%d\n", FILENAME, FNR > (step ".place")

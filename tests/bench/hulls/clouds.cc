@@ -34,7 +34,7 @@ std::vector<Vector> RandomCloud(const std::string& shape, size_t n) {
   return points;
 }
 
-// Points along a spiral, as from a turntable's scanner: one in 17 points is a vertex.
+// Points along a spiral, as from a turntable scanner: one in 17 points is a vertex.
 std::vector<Vector> Scan(size_t n) {
   std::mt19937_64 random(kSeed);
   std::normal_distribution<double> noise(0, 4e-4);

@@ -139,8 +139,8 @@ void InsertOneByOne(benchmark::State& state, Workload& workload) {
   Report(state, workload, vertices);
 }
 
-// Returns the minimum time of each point over kPasses passes, ascending. Includes one clock read,
-// some 20 to 30 ns.
+// Returns the minimum time of each point over kPasses passes, ascending. Includes one reading of
+// the clock, about 20 to 30 ns.
 template <typename Stream>
 std::vector<double> SortedLatencies(const std::vector<Vector>& points) {
   using Clock = std::chrono::steady_clock;
@@ -192,7 +192,7 @@ void RegisterBuilds() {
         "mesh:spot.obj", "scan:134345", "lattice:50"}) {
     const auto workload = std::make_shared<Workload>(name);
     Add("build", "hulld", BuildByHulld, workload);
-    // Benchmarks of many seconds run one time.
+    // Benchmarks that take many seconds run only a single time.
     const int repetitions = workload->name() == "sphere:1000000" ? 1 : 3;
     Add("build", "qhull", BuildByQhull, workload)->Repetitions(repetitions);
     Add("build", "cgal", BuildByCgal, workload)->Repetitions(repetitions);

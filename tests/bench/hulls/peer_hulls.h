@@ -9,8 +9,8 @@
 namespace hulld::bench {
 
 // Hulls of peer libraries, with the options that their users choose for speed. Each returns the
-// number of vertices of its hull. Conversion of the points to the peer's own type is not timed: it
-// happens before.
+// number of vertices of its hull. The points are converted to the peer's own type beforehand, which
+// is not timed.
 
 // qhull, option Qt, on 3 doubles per point. Uses doubles and merges coplanar facets: inexact.
 size_t QhullVertices(std::vector<double>& coordinates);

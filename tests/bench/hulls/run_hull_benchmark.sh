@@ -4,7 +4,7 @@
 #   bash tests/bench/hulls/run_hull_benchmark.sh [MACHINE] [SUITE...]
 #
 # MACHINE names the files, as in hull_build_MACHINE.csv: a CPU and a compiler; epyc_gcc12 by
-# default. SUITEs are build, snapshot, stream, cost and extremes; all by default, which takes some
+# default. SUITEs are build, snapshot, stream, cost and extremes; all by default, which takes a few
 # minutes. Requires the packages in docker/packages.txt under [build], [test] and [bench], and an
 # otherwise idle machine.
 set -euo pipefail
@@ -38,5 +38,5 @@ for suite in "${suites[@]}"; do
   esac
 done
 if [[ -f $results/hull_cost_$machine.csv ]]; then bash tests/bench/hulls/plot_hull_cost.sh "$machine"; fi
-# The tables of the pages show this machine.
+# The tables in the pages are about this machine.
 if [[ $machine == epyc_gcc12 ]]; then bash tests/bench/tables.sh --write "$machine"; fi

@@ -1,15 +1,16 @@
-// Cost of a step of a growing hull, of hulld and of Bullet: some points are added, then some
+// Cost of a step of a growing hull, for hulld and for Bullet: some points are added, then some
 // queries run.
 //
 //   live_benchmark [MAX_VERTICES [SECONDS]]
 //
 // with_box_us: the median of a step that also updates the bounding box; hulld always does, Bullet
 // by addPoint's default. One row of CSV per workload, number of vertices, and library. Both process
-// the same points and queries alternately, step by step; most steps omit a Bullet turn that would
-// take all the time. Like the server, hulld prepares in the background once queries have scanned as
-// much as preparation costs. Bullet appends a point to its list and builds nothing; the faster of
-// its two GJKs counts. The probe is a hull of 64 vertices near contact: if the growing hull were a
-// sphere, they would be separated or overlap by at most a tenth of its radius.
+// the same points and queries alternately, step by step; while Bullet has taken more than half of
+// the time, steps only add the points to its hull. Like the server, hulld prepares in the
+// background once queries have scanned as much as preparation costs. Bullet appends a point to its
+// list and builds nothing; the faster of its two GJKs counts. The probe is a hull of 64 vertices
+// near contact: if the growing hull were a sphere, they would be separated or overlap by at most a
+// tenth of its radius.
 
 #include <algorithm>
 #include <atomic>
@@ -198,7 +199,7 @@ class Run {
     Pose pose;
     pose.q = random_.Rotation();
     pose.t = OnSphere(1 + kProbeRadius + random_.Between(-0.1, 0.1));
-    // Adding the points is a part of the peer's step.
+    // Adding the points is part of the peer's step.
     const std::unique_ptr<GrowingPeer> peer = MakeGrowingPeer({});
     const int peer_colliding = peer == nullptr ? 0 : StepPeer(*peer, points, {pose});
     const auto start = Clock::now();

@@ -53,7 +53,7 @@ std::shared_ptr<const QuerySet> HullsOf(int vertices) {
   return set;
 }
 
-// Motions and their truth, made when the first benchmark needs them.
+// Motions and their truth, computed when the first benchmark needs them.
 class MotionWorkload {
  public:
   MotionWorkload(int vertices, bool turns, Passage passage)
@@ -66,7 +66,7 @@ class MotionWorkload {
     return motions_;
   }
   const std::vector<MotionTruth>& truth(Path path) {
-    // Both paths of a translation are one.
+    // For a translation, both paths are the same.
     if (!turns_) path = Path::kLinear;
     std::vector<MotionTruth>& truth = truth_[path];
     if (truth.empty()) truth = FindTruth(motions(), path);

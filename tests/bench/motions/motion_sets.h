@@ -31,7 +31,7 @@ struct MotionSet {
     Pose X_WA;
     Motion X_WB;
   };
-  // Its hulls only.
+  // Only its hulls are used.
   std::shared_ptr<const QuerySet> hulls;
   std::vector<Question> questions;
 

@@ -10,8 +10,8 @@
 namespace hulld::bench {
 namespace {
 
-// With a turn by 30 degrees, a piece deviates by at most 2.2e-9 radians: the hulls are within 1.5
-// of their origins.
+// For a rotation by 30 degrees, a piece deviates by at most 2.2e-9 radians, and the hulls are
+// within 1.5 of their origins.
 constexpr int kPieces = 64;
 constexpr double kDeviation = 1e-8;
 

@@ -29,7 +29,7 @@ struct MotionTruth {
 // certificates; a wrong one ends the program.
 //
 // kSteady: hulld's answers on 64 pieces of each path, which deviate from it by less than 1e-8. A
-// motion that this decides is left open.
+// motion with an answer that depends on this deviation is left open.
 std::vector<MotionTruth> FindTruth(const MotionSet& set, Path path);
 
 }  // namespace hulld::bench

@@ -5,9 +5,9 @@
 #   bash tests/bench/motions/run_motion_benchmark.sh [MACHINE] [SUITE...]
 #
 # MACHINE names the files, as in first_contact_MACHINE.csv: a CPU and a compiler; epyc_gcc12 by
-# default. SUITEs are motions and rays; both by default. REPETITIONS (5): the rows of motions hold
-# their median. Requires the packages in docker/packages.txt under [build], [test] and [bench]. The
-# rows alternate, so that load affects all alike.
+# default. SUITEs are motions and rays; both by default. REPETITIONS (5): each row of motions is the
+# median of this many runs. Requires the packages in docker/packages.txt under [build], [test] and
+# [bench]. The rows alternate, so that load affects all alike.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../../.."
 
@@ -38,5 +38,5 @@ for suite in "${suites[@]}"; do
       ;;
   esac
 done
-# The tables of the pages show this machine.
+# The tables in the pages are about this machine.
 if [[ $machine == epyc_gcc12 ]]; then bash tests/bench/tables.sh --write "$machine"; fi

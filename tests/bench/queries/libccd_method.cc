@@ -42,8 +42,8 @@ struct Libccd {
     ccd.center1 = Center;
     ccd.center2 = Center;
     ccd.max_iterations = 500;
-    // Tighter than the default of 1e-4, with which MPR answers some fifty more queries of the
-    // accuracy suite wrongly.
+    // Tighter than the default of 1e-4, with which MPR gives wrong answers to about fifty more
+    // queries of the accuracy suite.
     ccd.mpr_tolerance = 1e-14;
     ccd.epa_tolerance = 1e-10;
     return ccd;

@@ -49,7 +49,7 @@ constexpr size_t kRelations = 4096;
 // milliseconds.
 constexpr size_t kRelationsOfLarge = 256;
 
-// Queries, made when the first benchmark needs them, and their exact answers.
+// Queries, created when the first benchmark needs them, and their exact answers.
 class Workload {
  public:
   Workload(std::string set, Regime regime, size_t count)

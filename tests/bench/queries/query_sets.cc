@@ -140,8 +140,8 @@ void AddMatings(const std::string& name, Random& random, size_t count, QuerySet&
 }
 
 // Returns the pose of B at which its farthest vertex against `direction` coincides with A's
-// farthest along it: they touch there, separated by the plane across `direction`. Requires: snapped
-// hulls and exact rotations.
+// farthest along it: they touch there, separated by the plane perpendicular to `direction`.
+// Requires: snapped hulls and exact rotations.
 Pose TouchVertices(const QueryHull& a, const Pose& X_WA, const QueryHull& b, Pose X_WB,
                    const Vector& direction) {
   const Eigen::Matrix3d R_WA = PlacedHull::Make(a, X_WA)->R_WH();

@@ -5,8 +5,9 @@
 #
 # MACHINE names the files, as in query_relation_MACHINE.csv: a CPU and a compiler; epyc_gcc12 by
 # default. SUITEs are relation, contact, distance, motion, batch, scene, live, accuracy and trade;
-# all by default. REPETITIONS (5): the rows hold their median. HULLD_DATA: the folder of meshes. Requires the
-# packages in docker/packages.txt under [build], [test] and [bench], and an otherwise idle machine.
+# all by default. REPETITIONS (5): each row is the median of this many runs. HULLD_DATA: the folder
+# of meshes. Requires the packages in docker/packages.txt under [build], [test] and [bench], and an
+# otherwise idle machine.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../../.."
 
@@ -48,5 +49,5 @@ for suite in "${suites[@]}"; do
       ;;
   esac
 done
-# The tables of the pages show this machine.
+# The tables in the pages are about this machine.
 if [[ $machine == epyc_gcc12 ]]; then bash tests/bench/tables.sh --write "$machine"; fi

@@ -188,7 +188,7 @@ struct PlainGjk {
       if (Surrounds(simplex, n)) return Verdict::kColliding;
       if (n.squaredNorm() == 0) return Verdict::kColliding;
     }
-    // It cycled near the boundary: a guess.
+    // It cycles near the boundary, so the result is a guess.
     return Verdict::kColliding;
   }
 

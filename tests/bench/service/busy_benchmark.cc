@@ -7,7 +7,7 @@
 // endlessly, one for each core. Fair scheduling explains a ratio of 2; anything more is due to the
 // server. One row of CSV per kind of work and load. The loads alternate, ROUNDS (5) times, so that
 // machine drift affects all of them; percentiles are of the calls of all rounds, and ratios are to
-// the load "alone". A call is abandoned after 20 s and counted as 20 s. Run it by
+// the load "alone". A call is abandoned after 20 s and counted as 20 s. Run it with
 // run_busy_benchmark.sh.
 
 #include <grpcpp/grpcpp.h>
@@ -87,7 +87,7 @@ v1::BatchCheckCollisionsRequest MakeBatch(int pairs) {
   return request;
 }
 
-// Some 40 000 pairs with intersecting boxes.
+// About 40,000 pairs with intersecting boxes.
 v1::FindCollisionsRequest MakeScene() {
   constexpr int kPlacements = 4000;
   std::mt19937_64 random(5);

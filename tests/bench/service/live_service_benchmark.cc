@@ -11,12 +11,12 @@
 // - directly after each acknowledged chunk with an outside point;
 // - then about another hull, which shows the cost of the append to any following call;
 // - while another connection streams such chunks at full rate;
-// - during that about another hull, which shows the cost of the machine's load alone;
+// - in the same situation about another hull, which shows the cost of the machine's load alone;
 // - as the first query after a restart.
 //
 // One row of CSV per case: percentiles of the queries, their ratios to the case at rest, and the
-// writer's rate. The row "writer alone" has that rate without a reader. The cases alternate, so
-// that machine drift affects all of them.
+// writer's rate. The row "writer alone" has the rate without a reader. The cases alternate, so that
+// machine drift affects all of them.
 
 #include <grpcpp/grpcpp.h>
 

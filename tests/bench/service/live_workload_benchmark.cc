@@ -291,7 +291,7 @@ class Camera {
     return depths;
   }
 
-  // Replaces the hull by the points of a frame.
+  // Replaces the hull with the points of a frame.
   void Put(v1::HullService::Stub& stub, const std::string& hull_id,
            const std::vector<float>& depths) const {
     constexpr size_t kPointsPerMessage = 100'000;

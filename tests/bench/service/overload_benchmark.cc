@@ -5,7 +5,7 @@
 // One row of CSV per phase: "idle", and "batches" with N clients that send batches in sequence. The
 // phases alternate, ROUNDS (5) times with CALLS (2000) calls of CheckCollision each, so that
 // machine drift affects all of them; percentiles are of the calls of all rounds, and ratios are to
-// "idle". Run it by run_overload_benchmark.sh.
+// "idle". Run it with run_overload_benchmark.sh.
 
 #include <grpcpp/grpcpp.h>
 

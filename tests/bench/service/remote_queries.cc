@@ -116,7 +116,7 @@ struct Placements {
   }
 };
 
-// Places all hulls again, like a program with moving hulls, by all threads. Requires: `placed` has
+// Places all hulls again on all threads, like a program with moving hulls. Requires: `placed` has
 // the same size; its memory is reused.
 void PlaceAll(const Placements& placements, std::vector<PlacedHull>& placed) {
 #pragma omp parallel for schedule(static) num_threads(kThreads)

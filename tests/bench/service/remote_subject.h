@@ -55,7 +55,7 @@ struct RemoteWorkload {
   std::string unit;
   // Measures one round.
   std::function<Sample(RemoteSubject&)> run;
-  // Does the same work by core in this process; may be empty.
+  // Does the same work with core in this process; may be empty.
   std::function<Sample()> run_in_process = nullptr;
   // As run_in_process, with hulls placed each time at the poses of the request; empty if
   // run_in_process does that, or nothing needs placing.

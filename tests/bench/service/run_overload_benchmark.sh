@@ -24,5 +24,5 @@ until address=$(sed -n 's/.*listening on //p' "$log") && [[ -n $address ]]; do
 done
 build/release/bin/overload_benchmark "$address" "${ROUNDS:-5}" "${CALLS:-2000}" >"$out"
 column -s, -t "$out"
-# The tables of the pages show this machine.
+# The tables in the pages are about this machine.
 if [[ $machine == epyc_gcc12 ]]; then bash tests/bench/tables.sh --write "$machine"; fi

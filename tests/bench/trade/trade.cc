@@ -114,7 +114,7 @@ std::optional<TradeDepths> Summarize(const std::optional<DepthMeasurement>& meas
       ++depths.none;
     }
   }
-  // It finds no depth at all.
+  // The method finds no depth at all.
   if (errors.empty()) return std::nullopt;
   depths.median_error = Median(errors);
   depths.largest_error = *std::max_element(errors.begin(), errors.end());

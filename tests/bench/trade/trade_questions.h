@@ -17,9 +17,9 @@ namespace hulld::bench {
 //   near contact:  1e-6 deep and apart, likewise 1e-9, 1e-12, 1e-15, and as little as doubles allow
 //   depth:         half-way deep, 1e-3 deep, 1e-6 deep
 //
-// Half of the pairs are at the origin, where translations are finest, half some 100 radii from it,
-// as in a scene. Every method receives the same geometry: random rotations are rounded into the
-// points, and a pose is an exact translation.
+// Half of the pairs are at the origin, where translations are finest, and half are about 100 radii
+// away from it, as in a scene. Every method receives the same geometry: random rotations are
+// rounded into the points, and a pose is an exact translation.
 struct TradeQuestions {
   static constexpr size_t kLevels = 15;
 

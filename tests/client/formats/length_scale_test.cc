@@ -192,7 +192,7 @@ TEST(ScaledPoints, TextAndFloatsAreScaledByAxis) {
               HasSubstr("exceeds the largest double"));
 }
 
-// As a URDF or COLLADA file may name it; recursion without end, formerly.
+// A URDF or COLLADA file may contain such scales, which formerly caused infinite recursion.
 TEST(LengthScale, IntegersOfManyDigitsAreShortened) {
   EXPECT_EQ(Scale("18446744073709551615").Apply(1), 0x1p64);
   EXPECT_EQ(Scale("-9007199254740993000001").Apply(1), -9007199254740993000001.0);

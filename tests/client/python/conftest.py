@@ -32,7 +32,7 @@ def client(server: hulld.LocalServer) -> Iterator[hulld.Client]:
 
 
 class Blocking:
-    """An asynchronous object, used like its synchronous twin: one test tries both.
+    """An asynchronous object, used like its synchronous twin, so that one test covers both.
 
     The loop runs in a thread of its own, so that any thread may call.
     """
@@ -60,7 +60,7 @@ class Blocking:
             return value
 
         def call(*arguments: Any, **options: Any) -> Any:
-            # Some open channels and calls, which belong to the running loop.
+            # Some routines open channels and calls, which belong to the running loop.
             async def start() -> Any:
                 return value(*arguments, **options)
 

@@ -1,5 +1,6 @@
 #!/bin/bash
-# Installs the Python client into an environment of its own, as its page says, and runs its tests.
+# Installs the Python client into an environment of its own, as described on its page, and runs its
+# tests.
 #
 #   run_tests.sh PROGRAMS WORK [PYTEST_ARGUMENT...]
 #

@@ -93,7 +93,7 @@ def test_two_point_sets_are_checked_in_one_line(monkeypatch: pytest.MonkeyPatch)
             hulld.check(*bad)
     with pytest.raises(TypeError, match="separate"):
         hulld.check(CUBE, CUBE, separate=True)
-    # The latest point sets stay for further calls.
+    # The latest point sets are kept for further calls.
     monkeypatch.setattr("hulld.local_server._MAX_SHAPES", 3)
     for x in range(9):
         hulld.check(CUBE, CUBE + (x, 0, 0))

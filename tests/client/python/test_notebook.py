@@ -34,7 +34,7 @@ def test_cells_share_the_page(either: Any, name: str, monkeypatch: pytest.Monkey
     first, second = hull._repr_html_(), either.get_hull_mesh(name)._repr_html_()
     assert "<div hidden" in first and len(first) < 500_000
     assert "<div hidden" not in second and len(second) < 10_000
-    # A cell that runs again carries the page again; other cells do not.
+    # A cell that runs again contains the page again; other cells do not.
     for cell, carries in (("a", False), (None, False)):
         monkeypatch.setattr("hulld.notebook._cell", lambda cell=cell: cell)
         assert ("<div hidden" in hull._repr_html_()) == carries

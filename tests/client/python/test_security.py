@@ -129,7 +129,8 @@ def test_tls_with_certificates_and_tokens(
         with pytest.raises(hulld.UnauthenticatedError) as missing:
             connect(server.address, tls=tls).get_hull("a")
         assert missing.value.reason == "TOKEN_MISSING"
-        # Without a certificate of ours, with another authority, and without TLS nothing is reached.
+        # The server cannot be reached without our client certificate, with another authority, or
+        # without TLS.
         for wrong in (
             hulld.Tls(secrets / "ca.pem", server_name="hulld.test"),
             hulld.Tls(server_name="hulld.test"),

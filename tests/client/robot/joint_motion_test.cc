@@ -173,7 +173,7 @@ TEST_P(JointMotion, PointsStayWithinTheirDeviationAndTravel) {
       }
     }
   }
-  // The bound is not idle.
+  // The bound is tight enough to matter.
   EXPECT_GT(largest_ratio, 0.05);
 }
 

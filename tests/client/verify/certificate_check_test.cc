@@ -150,7 +150,7 @@ TEST(CertificateCheck, RotationsAreExact) {
   ExpectInvalid(kTouching, same, a, At({1, -2, std::nextafter(6.0, 9.0)}), "max n.A > min n.B");
   const Hull twice = Turned(At({0, 0, 5}), 0, 0, 0, 0);
   ExpectInvalid(kTouching, same, twice, a, "rotation is zero");
-  // A rotation that is no double: a third of a full turn about the diagonal.
+  // A rotation that doubles cannot represent: a third of a full turn about the diagonal.
   const Hull turned = Turned(At({1, 2, 3}), 1, 1, 1, 1);
   ExpectValid(kTouching, same, turned, At({3, 1, 2}));
   ExpectInvalid(kTouching, same, turned, At({2, 3, 1}), "");

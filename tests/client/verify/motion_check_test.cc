@@ -268,7 +268,7 @@ Claim RodTouches(const Numbers& n = {0, -1, 0}) {
 
 TEST(MotionCheck, PlanesProveARotation) {
   ExpectValid(RodTouches(), kCeiling, kTurningRod);
-  // The end of the rod that rests is no part of the contact.
+  // The end of the rod that is at rest is not part of the contact.
   Claim other = RodTouches();
   other.certificate.mutable_pairs(0)->set_index_b(0);
   other.certificate.mutable_pairs(1)->set_index_b(0);
@@ -322,7 +322,7 @@ TEST(MotionCheck, TheLengthOfAQuaternionIsPartOfTheMotion) {
 }
 
 TEST(MotionCheck, APlaneMustSeparateBetweenTheEnds) {
-  // The tip of the rod sweeps from (0, -5, 0) over (5, 0, 0) to (0, 5, 0).
+  // The tip of the rod sweeps from (0, -5, 0) through (5, 0, 0) to (0, 5, 0).
   const Moving rod = Turned(kRod, {1, 0, 0, -1}, {1, 0, 0, 1});
   const Moving wall = Resting(Box({4.5, -1, -1}, {6, 1, 1}));
   ExpectInvalid(Separated().Until(1, {-1, 0, 0}, -4), wall, rod, "B does not stay");

@@ -220,7 +220,8 @@ TEST(PieceCheck, BoxesAreExact) {
       EXPECT_EQ(Fault(kSeparated, {}, a, b).empty(), z != 5) << scale << " " << z;
     }
   }
-  // By 3/5 and 4/5, which are no doubles: the products of the poses are exact, and so is contact.
+  // By 3/5 and 4/5, which doubles cannot represent: the products of the poses are exact, and so is
+  // the contact.
   Body a(Turned(At(1, 0, 0), 2, 1, 0, 0));
   a.Add({0, 0, 5}, Turned(At(0, 0, 0), 2, -1, 0, 0));
   for (const double z : {std::nextafter(5.0, 0.0), 5.0, std::nextafter(5.0, 6.0)}) {

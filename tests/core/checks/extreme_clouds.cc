@@ -104,7 +104,7 @@ Points BoxFacesWithinAnUlp(int n) {
 }
 
 // n integer points on a sphere around the origin: exactly cospherical. The radius grows until
-// enough points exist; its square stays 1 modulo 4, because 4^a (8b + 7) is no sum of three
+// enough points exist; its square stays 1 modulo 4, because 4^a (8b + 7) is not a sum of three
 // squares.
 Points Cospherical(int n) {
   for (int64_t radius_squared = 4 * n + 1;; radius_squared = 2 * radius_squared - 1) {
@@ -186,7 +186,7 @@ Points SortedAlongX(Points points) {
   return points;
 }
 
-// Alternates between both ends of x.
+// Alternates between the two ends of the x axis.
 Points FromBothEnds(const Points& sorted) {
   Points points;
   for (size_t i = 0, j = sorted.size(); i < j;) {
@@ -202,7 +202,7 @@ Points GrowingShells(int n) {
   return points;
 }
 
-// All of a tilted plane first, then a ball on either side.
+// First all points of a tilted plane, then a ball on each side of it.
 Points PlaneFirst(int n) {
   Random random(kSeed);
   Points points;

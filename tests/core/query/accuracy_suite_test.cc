@@ -1,4 +1,4 @@
-// The queries on which tests/bench counts the wrong answers of every library: none here.
+// The queries on which tests/bench counts wrong answers, by library: hulld gives none.
 
 #include "tests/bench/queries/accuracy_suite.h"
 

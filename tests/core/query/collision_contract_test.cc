@@ -111,7 +111,8 @@ TEST(Collision, HullsThatTouchedAreAnsweredFromTheCacheAtTheSameRelativePose) {
     const Pose into = At(std::nextafter(0.5 + side, 0.5), 0.25, 0);
     EXPECT_EQ(ask(X_WA, into, &cache).first, Relation::kOverlapping);
     EXPECT_EQ(ask(X_WA, X_WB, &cache).first, Relation::kTouching);
-    // Another quaternion of the same rotation is not recognized, and a tolerance requires less.
+    // Another quaternion of the same rotation is not recognized, and with a tolerance, less
+    // evidence is required.
     Pose turned = X_WB;
     turned.q = {2, 0, 0, 0};
     EXPECT_EQ(ask(X_WA, turned, &cache), exactly);

@@ -183,7 +183,7 @@ TEST(ExactWidth, SmallIntegersAtEveryScale) {
     }
     ASSERT_TRUE(check.Ask(scaled(points_a), X_WA, scaled(points_b), X_WB, expected))
         << "seed " << seed << " round " << i;
-    // Right-angle and third turns cost no bits.
+    // Quarter and third turns take no additional bits.
     ASSERT_TRUE(check.bits().has_value() && *check.bits() <= 12) << *check.bits();
   }
   EXPECT_GT(check.count(ExactWidth::k1Word), 1500);

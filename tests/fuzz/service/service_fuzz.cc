@@ -193,7 +193,7 @@ std::map<std::string, std::string> ServiceFuzz::Contents() {
 std::string ServiceFuzz::Reopen() {
   const std::map<std::string, std::string> before = Contents();
   std::string former;
-  // Every second time, a backup replaces the store.
+  // Every other time, a backup replaces the store.
   if (opened_ % 2 == 0) {
     const std::string file = absl::StrCat(directory_, "/backup-", opened_);
     BackupWriter writer(file);

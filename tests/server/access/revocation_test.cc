@@ -124,7 +124,7 @@ TEST_F(Revocation, EndsIdleStreamsOfTheRevokedTokenOnly) {
 }
 
 TEST_F(Revocation, EndsRunningComputations) {
-  // 5e9 pairs: hours.
+  // 5e9 pairs take hours.
   v1::FindCollisionsRequest request;
   for (int i = 0; i < 100'000; ++i) *request.add_placements() = PlacementOf("cube");
   grpc::ClientContext context;

@@ -196,7 +196,7 @@ TEST(CallLifetime, DeadlinesDoNotFollowTheTimeOfDay) {
     EXPECT_FALSE(CallLifetime(wall + seconds(500), wall, now).ShouldStop());
     EXPECT_TRUE(CallLifetime(wall - seconds(1), wall, now).ShouldStop());
     EXPECT_TRUE(absl::IsDeadlineExceeded(CallLifetime(wall, wall, now).StopStatus()));
-    // Effectively none.
+    // Effectively no deadline.
     EXPECT_EQ(CallLifetime(wall + hours(1'000'000), wall, now).deadline(),
               Clock::time_point::max());
   }

@@ -86,7 +86,7 @@ class LimitsTest : public ServerTest {
     return reader.Finish();
   }
 
-  // Waits until no call runs.
+  // Waits until no call is running.
   bool WaitIdle() { return server_->WaitIdle(std::chrono::minutes(5)); }
 
   grpc::Status GetHull(grpc::ClientContext* context) {

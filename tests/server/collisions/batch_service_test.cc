@@ -109,8 +109,8 @@ class BatchCall : public ServerTest {
   }
 };
 
-// The table of the hulls of 20000 placements with long names exceeds 5 MB. No client must accept a
-// message above 4 MiB, and this one does not.
+// The table of the hulls of 20000 placements with long names exceeds 5 MB. A client need not accept
+// messages above 4 MiB, and this one does not.
 class LongTable : public BatchCall {
  protected:
   static constexpr int kPlacements = 20'000;

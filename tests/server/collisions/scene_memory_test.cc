@@ -42,7 +42,7 @@ class SceneMemory : public ServerTest {
 };
 
 // 2e10 pairs overlap and the client reads no answer. The scene holds the placements, the tree of
-// their boxes, and the answers that gRPC has not taken: some MiB, counted against --memory-limit.
+// their boxes, and the answers that gRPC has not taken: a few MiB, counted against --memory-limit.
 TEST_F(SceneMemory, AnUnreadSceneIsCountedAndBounded) {
   constexpr int kPlacements = 200'000;
   // Placed hulls, their boxes twice, the tree.

@@ -105,7 +105,7 @@ TEST(TaskPool, ConnectionsOfAClientTakeTurns) {
   Order order;
   for (const char* name : {"a1", "a2", "a3"}) held.pool().Submit(order.Task(name), {1, 10});
   held.pool().Submit(order.Task("A1"), {1, 11});
-  // Another client has a turn for each turn of all connections of the first.
+  // Another client gets a turn for each turn of all connections of the first one.
   for (const char* name : {"b1", "b2", "b3"}) held.pool().Submit(order.Task(name), {2, 12});
   held.Release();
   held.End();

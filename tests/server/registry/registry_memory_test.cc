@@ -467,7 +467,7 @@ TEST(RegistryOfMemoryStore, ASmallHullHasABuilderOnlyWhileASessionIsOpen) {
   EXPECT_GT(bytes(), live.MemoryBytes() + HullBuilder().MemoryBytes());
   hulls.registry().hulls().CloseAppend(opened->session);
   EXPECT_EQ(bytes(), live.MemoryBytes());
-  // The next session goes on from there.
+  // The next session continues from there.
   EXPECT_EQ(hulls.Put("h", {{3, 0, 0}, {0, 0, 0}})->counts, (PointCounts{2, 1, 1, 0}));
 }
 

@@ -13,8 +13,8 @@ namespace hulld::server {
 namespace mutant_test {
 
 constexpr uint64_t kMax = 300'000;
-// **Observed**: the rarest defect, AListIsOfALaterMoment, is found within 33,235 schedules from
-// here.
+// **Observed**: the rarest defect, AListIsOfALaterMoment, is found within the first 33,235
+// schedules.
 constexpr uint64_t kFirstSeed = 1'000'001;
 
 // Explores in a separate process, because a defect may break an invariant. Returns its exit status.

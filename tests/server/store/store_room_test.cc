@@ -141,7 +141,7 @@ TEST(SmallDiskRoom, AFullDiskAcceptsDeletionsAndAllowsAStart) {
   };
   for (; count < 20; ++count) ASSERT_TRUE(put().ok());
   for (int attempt = 0; attempt < 3; ++attempt) {
-    // Preallocated bytes of the log have space for some more changes.
+    // Preallocated bytes of the log have space for a few more changes.
     absl::Status refused;
     for (; refused.ok(); ++count) {
       disk.Fill();

@@ -43,8 +43,8 @@ TEST(DaeFile, ComesInMetersWithItsAxesAsTheyAre) {
   }
 }
 
-// 3 inches are the double nearest to 0.0762, not 3 times a rounded factor; 0.1 inches that nearest
-// to 0.00254, although no double is 0.1.
+// 3 inches are the double nearest to 0.0762, not 3 times a rounded factor; 0.1 inches are the
+// double nearest to 0.00254, although no double is exactly 0.1.
 TEST(DaeFile, UnitsAreRoundedOnce) {
   const std::string moved =
       DaeText("<instance_geometry", "<translate>1 0 0</translate><instance_geometry");

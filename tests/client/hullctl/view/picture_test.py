@@ -68,7 +68,7 @@ class PictureTest(viewer_case.ViewerCase):
         self.view(self.place_boxes("pairs.json", [(x, 0, 0) for x in (0, 10, 20, 22)]))
         self.browser.wait("hulldViewer.model.pair?.join() === '2,3'")
         self.assertEqual(self.assert_answers_as_api()["relation"], "RELATION_TOUCHING")
-        # A choice of the user stays.
+        # The user's choice is kept.
         self.keys(Keys.ESCAPE)
         self.browser.js("hulldViewer.ask(true)")
         self.browser.wait("hulldViewer.model.collisions.update === hulldViewer.update")

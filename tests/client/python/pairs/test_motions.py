@@ -46,7 +46,7 @@ def test_translations_meet_at_exact_times(
         verifier.check(cube, (cube, AWAY), answer, to_b=(-3, 0, 0))
     for other in {hulld.Relation.SEPARATED, hulld.Relation.OVERLAPPING} - {relation}:
         if relation is hulld.Relation.TOUCHING and other is hulld.Relation.OVERLAPPING:
-            continue  # That a translation overlaps after it touches is no part of the proof.
+            continue  # The proof does not show that a translation overlaps after it touches.
         with pytest.raises(hulld.VerificationError):
             forged = dataclasses.replace(answer, relation=other)
             verifier.check(cube, (cube, AWAY), forged, to_b=to)

@@ -273,7 +273,8 @@ TEST(DegenerateHull, PowersOfTwoOnEachAxisKeepTheFacetsOfLargeSets) {
 }
 
 // Snapshots have canonical order for any distribution of the vertices' x: on a sphere, in two
-// planes, near one end, on either side of zero, and so far apart that their distance is no double.
+// planes, near one end, on either side of zero, and so far apart that their distance is not a
+// double.
 TEST(DegenerateHull, SnapshotsAreCanonicalForAnyDistributionOfX) {
   Random random(209);
   const std::vector<Vector> sphere = RandomOnSphere(random, 300, 1);

@@ -47,8 +47,8 @@ std::vector<Vector> GrowingShells(Random& random, size_t n) {
   return points;
 }
 
-// When points are inserted one by one, none does much more than its share of the housekeeping:
-// apart from removing and creating triangles, its work is O(log^2 n).
+// When points are inserted one by one, no insertion does much more than its share of the
+// housekeeping: apart from removing and creating triangles, its work is O(log^2 n).
 TEST(HullCost, NoSinglePointStalls) {
   const uint64_t seed = TestSeed(501);
   Random random(seed);
@@ -72,8 +72,8 @@ TEST(HullCost, NoSinglePointStalls) {
   }
 }
 
-// Most points of a ball are inside, and the direction map rejects them in any order: few locate
-// themselves by walking over the surface.
+// Most points of a ball are inside, and the direction map rejects them in any order: few points are
+// located by walking over the surface.
 TEST(HullCost, InsidePointsAreRejectedWithoutAWalk) {
   const uint64_t seed = TestSeed(509);
   Random random(seed);
@@ -106,7 +106,7 @@ std::vector<Vector> DepthFrame(Random& random, int width, int height) {
 }
 
 // Each block of a frame is flat and adjacent to the previous ones. The direction map follows them
-// in any orientation: few points locate themselves by walking.
+// in any orientation: few points are located by walking.
 TEST(HullCost, DepthFramesAreRejectedWithoutAWalk) {
   const uint64_t seed = TestSeed(510);
   Random random(seed);
@@ -183,7 +183,8 @@ std::vector<Vector> ParabolaPrism(int n) {
   return points;
 }
 
-// Facets with many corners grow at one side: no point costs as much as its facet has corners.
+// Facets with many corners grow at one side: the cost of a point is far below the number of corners
+// of its facet.
 TEST(HullCost, FacetsOfManyCornersTakeLessThanQuadraticTime) {
   const uint64_t seed = TestSeed(508);
   for (const bool one_by_one : {false, true}) {

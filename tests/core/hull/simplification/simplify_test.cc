@@ -24,7 +24,7 @@
 namespace hulld {
 namespace simplify_test {
 
-// Exact audits take the square of this.
+// The time of an exact audit grows with the square of this.
 #ifdef HULLD_SANITIZED
 constexpr int kLargeSphere = 1000;
 #else
@@ -92,7 +92,7 @@ TEST_P(Simplify, InsideIsASubsetWithinItsProvenError) {
     EXPECT_TRUE(IsSubset(inside->hull, full));
     const double least = MinHausdorffDistance(inside->hull, full);
     EXPECT_GE(inside->error, least * (1 - 1e-12));
-    // Sampled directions are weak for slender shapes.
+    // Sampled directions give weak bounds for slender shapes.
     if (radii.minCoeff() > 0.1) {
       EXPECT_LE(inside->error, 2 * least);
     }

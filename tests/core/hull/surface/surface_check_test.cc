@@ -149,7 +149,7 @@ TEST_F(SurfaceCheck, FindsWrongCounts) {
   EXPECT_STREQ(Defect(), "IDs are neither alive nor free");
 }
 
-// Flips the diagonal of two neighbors: all links are right, and the edge is a dent.
+// Flips the diagonal of two neighbors: all links are correct, but the edge is concave.
 TEST_F(SurfaceCheck, FindsADent) {
   const TriangleId f = 0;
   const TriangleId g = Triangle(f).neighbors[0];

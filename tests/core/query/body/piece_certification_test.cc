@@ -129,7 +129,7 @@ TEST(PieceCertification, RoundingLeavesNoPairOut) {
   Proven proven;
   for (const double scale : {1e-310, 1e-160, 1e-30, 1.0, 1e150, 1e306}) {
     OwnBody a, b;
-    // Large translations that cancel, for hulls far below their rounding.
+    // Large translations that cancel, for hulls far smaller than their rounding errors.
     const double far = scale * 1e15;
     const bool cancels = scale < 1e290;
     a.Add(Scaled(LatticeCube(2, 1), scale), cancels ? At(far, far, 0) : Pose());

@@ -33,7 +33,8 @@ std::optional<LatticeContact> Find(const Hull& a, const Pose& X_WA, const Hull& 
   return FindLatticeContact(pair, end);
 }
 
-// Moves B so that a vertex of A and one of B meet, up to rounding of turns off the lattice.
+// Moves B so that a vertex of A and one of B meet, up to the rounding of rotations that leave the
+// lattice.
 Pose WithMeetingVertices(Random& random, const Hull& a, const Pose& X_WA, const Hull& b,
                          Pose X_WB) {
   const QueryHull query_a(a);
@@ -57,7 +58,7 @@ Hull SmallHull(Random& random) {
   return BuildHull(points);
 }
 
-// The identity, a quarter or third turn, or a turn off the lattice, at any scale.
+// The identity, a quarter or third turn, or a rotation that leaves the lattice, at any scale.
 Pose SmallPose(Random& random) {
   Pose pose;
   const double c = random.Between(1, 3);
@@ -115,7 +116,7 @@ TEST(LatticeContact, CoordinatesWithManyBitsAreLeftToIntegers) {
   Pose X_WA;
   X_WA.t = {0, 0, 0x1p-60};
   EXPECT_FALSE(Find(box, X_WA, box, X_WB));
-  // A common offset costs no bits.
+  // A common offset takes no additional bits.
   X_WA.t = {0x1p30, 0, 0};
   X_WB.t += X_WA.t;
   EXPECT_TRUE(Find(box, X_WA, box, X_WB));

@@ -125,7 +125,7 @@ inline testing::AssertionResult ContactIsProven(const OwnMoving& a, const OwnMov
     return testing::AssertionFailure() << "a contact without a certificate, or the reverse";
   }
   if (!meets) return testing::AssertionSuccess();
-  // Tests of core check certificates of rounded hulls.
+  // Certificates of rounded hulls are checked by other tests of core.
   if (points_a.radius > 0 || points_b.radius > 0) return testing::AssertionSuccess();
   const oracle::WorldPoints world =
       oracle::PlaceInWorldAt(points_a, points_b, oracle::Rational(*contact.contact_time));

@@ -114,7 +114,7 @@ TEST(CenterBounds, RoundHullsAreBoundedClosely) {
   }
 }
 
-// Cells are made lazily by any thread: their contents depend on neither thread nor order.
+// Cells are created lazily by any thread: their contents depend on neither thread nor order.
 TEST(CenterBounds, CellsDoNotDependOnTheOrderOfTheirCreation) {
   const uint64_t seed = TestSeed(907);
   Random random(seed);

@@ -34,7 +34,7 @@ class HistoryClient {
   HistoryClient(const std::shared_ptr<grpc::Channel>& channel, HullHistory& history,
                 std::string name, uint64_t seed);
 
-  // Makes later reads use any freshness: latest, the revision of the last answer, a bound of some
+  // Makes later reads use any freshness: latest, the revision of the last answer, a bound of a few
   // milliseconds, or both. Default: latest.
   void ReadAtAnyFreshness() { any_freshness_ = true; }
 

@@ -46,7 +46,7 @@ class Socket {
     }
     return received_;
   }
-  // Reads until the text arrives. Returns false if the peer closed before.
+  // Reads until the text arrives. Returns false if the peer closes first.
   bool ReadUntil(const std::string& text) {
     while (received_.find(text) == std::string::npos) {
       if (!ReadSome()) return false;
