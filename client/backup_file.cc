@@ -141,7 +141,7 @@ absl::StatusOr<std::vector<fs::path>> MakeDirectories(const fs::path& directory)
 }
 
 // Moves the unpacked files into place. The mark comes first and the database last, in one step: the
-// directory holds either no store, or the complete backup with the mark.
+// directory contains either no store, or the complete backup with the mark.
 absl::Status MoveIntoPlace(const fs::path& staging, const fs::path& directory) {
   const fs::path mark = directory / kRestoredMark;
   std::ofstream(mark).close();

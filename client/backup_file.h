@@ -63,7 +63,7 @@ class BackupWriter {
 };
 
 // Name of the file that marks a data directory as restored. The original and the restored store
-// assign the same revisions to different changes, so hulld gives a marked store a new ID.
+// assign the same revisions to different changes, so hulld assigns a new ID to a marked store.
 inline constexpr char kRestoredMark[] = "restored";
 
 // Creates a data directory from a backup: the complete store, or none. An existing directory must

@@ -16,7 +16,8 @@ namespace {
 constexpr size_t kStlHeaderBytes = 80;
 constexpr size_t kTriangleBytes = 50;
 // A prefix that contains the count and 18 triangles of a binary file. One of its bytes is a control
-// character: at the latest the high byte of the count, if the file has less than 2^24 triangles.
+// character: the high byte of the count if no other, as long as the file has fewer than 2^24
+// triangles.
 constexpr size_t kBytesToClassify = 1024;
 
 // Text is a sequence of words: lines matter only after `solid` and `endsolid`, where the name is

@@ -52,8 +52,8 @@ BigVector Product(const BigVector (&rows)[3], const BigVector& p) {
 
 }  // namespace
 
-// Every entry of R(q) and |q|^2 is a sum of products of two components. A product x y becomes
-// (x y' + x' y) / 2; R(q) holds off its diagonal only doubled products of different components.
+// Every entry of R(q) and |q|^2 is a sum of products of two components. A product x y becomes (x y'
+// + x' y) / 2; off its diagonal, R(q) contains only doubled products of different components.
 BigRotation RotationForm(const BigQuaternion& a, const BigQuaternion& b) {
   const auto square = [&](int i) -> BigInteger { return a[i] * b[i]; };
   const auto twice = [&](int i, int j) -> BigInteger { return a[i] * b[j] + a[j] * b[i]; };

@@ -384,7 +384,7 @@ absl::Status CheckWidth(const v1::FirstContact& contact, double most) {
 }
 
 // Contact of a translation between two times. All differences of vertices move alike, so their
-// hulls at these times span all hulls in between; one of them holds 0 if the span does.
+// hulls at these times span all hulls in between; one of them contains 0 if the span does.
 absl::Status CheckBriefContact(const MovingPair& pair, const v1::FirstContact& contact,
                                const v1::Certificate& certificate) {
   std::vector<BigVector> span;

@@ -47,7 +47,7 @@ bool IsWithinOfSegment(const BigVector& p, const BigVector& a, const BigVector& 
          Squared(Cross(from_a, along)) <= distance_squared * length_squared;
 }
 
-// Same as above, for a triangle that holds the nearest point of its plane.
+// Same as above, for a triangle that contains the nearest point of its plane.
 bool IsWithinOfFace(const BigVector& p, const Corners& t, const BigInteger& distance_squared) {
   const BigVector normal = Cross(t.b - t.a, t.c - t.a);
   if (IsZero(normal)) return false;

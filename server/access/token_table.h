@@ -13,7 +13,8 @@
 
 namespace hulld::server {
 
-// The callers of --tokens-file, by the hashes of their tokens. The file holds one token per line:
+// The callers of --tokens-file, by the hashes of their tokens. The file contains one token per
+// line:
 //
 //   # name    role       prefix  hash
 //   camera-1  read-write cell-1/ sha256:9f86d081...b0f00a08
@@ -27,8 +28,8 @@ namespace hulld::server {
 // new).
 class TokenTable {
  public:
-  // Parses the text of a file. Text without a token gives an empty table. INVALID_ARGUMENT names
-  // the line; it never quotes a hash.
+  // Parses the text of a file. Text without a token results in an empty table. INVALID_ARGUMENT
+  // names the line; it never quotes a hash.
   static absl::StatusOr<TokenTable> Parse(const std::string& text);
 
   // Returns the owner of the token, if any. Takes constant time with respect to the length of a
@@ -58,9 +59,9 @@ class TokenTable {
   std::vector<Entry> entries_;
 };
 
-// Reads --tokens-file. may_be_empty: a missing file or one without a token gives an empty table, as
-// the last token may have been revoked. INVALID_ARGUMENT: as ReadSecretFile and TokenTable::Parse,
-// or the file contains no token and may not be empty.
+// Reads --tokens-file. may_be_empty: a missing file or one without a token results in an empty
+// table, as the last token may have been revoked. INVALID_ARGUMENT: as ReadSecretFile and
+// TokenTable::Parse, or the file contains no token and may not be empty.
 absl::StatusOr<TokenTable> ReadTokensFile(const std::string& path, bool may_be_empty = false);
 
 }  // namespace hulld::server

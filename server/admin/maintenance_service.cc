@@ -25,7 +25,7 @@
 namespace hulld::server {
 namespace {
 
-// A backup holds the hulls of all callers.
+// A backup contains the hulls of all callers.
 absl::Status CheckSeesAll(const Caller& caller) {
   if (caller.sees_all()) return absl::OkStatus();
   return WithReason(absl::PermissionDeniedError(absl::StrCat(

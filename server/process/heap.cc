@@ -14,10 +14,10 @@ namespace {
 // Free bytes that malloc may keep. A choice: ordinary work leaves less free.
 constexpr size_t kWorthIt = 64 << 20;
 // Blocks of at least this size are mapped and unmapped individually. A choice: above the lists of a
-// message of some MiB, which double as they grow.
+// message of a few MiB, which double as they grow.
 constexpr int kMappedBytes = 8 << 20;
-// Bytes that an arena may keep free at its end. A choice: the memory of a call with a message of
-// some MiB.
+// Bytes that an arena may keep free at its end. A choice: the memory of a call with a message of a
+// few MiB.
 constexpr int kKeptBytes = 32 << 20;
 
 }  // namespace

@@ -15,8 +15,8 @@
 namespace hulld::server {
 namespace {
 
-// Fields of the event that this thread is logging: spdlog's messages hold only text, and its sinks
-// run on the thread of LogEvent.
+// Fields of the event that this thread is logging: spdlog's messages contain only text, and its
+// sinks run on the thread of LogEvent.
 thread_local const LogFields* current_fields = nullptr;
 bool is_json = false;
 

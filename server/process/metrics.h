@@ -25,7 +25,7 @@
 
 namespace hulld::server {
 
-// Timings of the store. Comments give the names in Prometheus.
+// Timings of the store. Comments state the names in Prometheus.
 struct StoreMetrics {
   // hulld_store_commit_duration_seconds: from submission of a change to its acknowledgement.
   prometheus::Histogram& commit_seconds;

@@ -36,7 +36,7 @@ class TaskPool {
   // and a task switch (**observed**: 2 us) costs a hundredth.
   static constexpr std::chrono::microseconds kSliceTime{250};
   // While single calls arrive, and for this long afterwards, slices leave one thread's core to
-  // them: the system runs a computing thread for some milliseconds (a tick of Linux is 1 to 10 ms)
+  // them: the system runs a computing thread for a few milliseconds (a tick of Linux is 1 to 10 ms)
   // before it schedules gRPC's threads, which bring the calls.
   static constexpr std::chrono::milliseconds kReserveTime{20};
   // During that time, a thread pauses for this long after each slice, so that the system gives its

@@ -24,7 +24,7 @@ namespace hulld::server {
 namespace {
 
 constexpr uint64_t kMaxVertexIndex = std::numeric_limits<uint32_t>::max();
-// Answers hold the index of a piece as a signed number.
+// Answers contain the index of a piece as a signed number.
 constexpr uint64_t kMaxPieceIndex = std::numeric_limits<int32_t>::max();
 constexpr uint64_t kMaxGrpcMessageBytes = std::numeric_limits<int32_t>::max();
 

@@ -95,7 +95,7 @@ struct Config {
   // The directory of "rocksdb". If empty, ParseCommandLine sets it to hulld in $XDG_STATE_HOME, or
   // in ~/.local/state, or, without a home, to ./hulld-data.
   std::string data_dir;
-  // The file that holds the connection string of "postgres".
+  // The file that contains the connection string of "postgres".
   std::string postgres_conninfo_file;
   // True to replace the active server of a "postgres" store instead of waiting for it. Command line
   // only: servers that always did this would replace each other in turn.

@@ -38,7 +38,7 @@ size_t AddNoTimes(v1::AnswerColumns* columns);
 // other columns.
 bool NamesRows(const v1::AnswerColumns& columns);
 
-// Adds a row without an answer. The reply gives the reason elsewhere, with the placement.
+// Adds a row without an answer. The reply states the reason elsewhere, with the placement.
 size_t AddUnanswered(const v1::Wanted& wanted, v1::AnswerColumns* columns);
 
 }  // namespace hulld::server

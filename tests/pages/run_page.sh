@@ -90,7 +90,7 @@ for place in "$work"/steps/*.place; do
   else
     ran=$((ran + 1))
     touch "$step.expected"
-    # Pages use the default port; replaces it by the port of this run.
+    # Pages use the default port; replaces it with the port of this run.
     command=$(sed "s/127\.0\.0\.1:50551/${HULLCTL_SERVER:-127.0.0.1:50551}/g" "$step.command")
     if is_server "$command"; then
       start_server "$command" "$step.actual"

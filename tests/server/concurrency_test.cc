@@ -64,7 +64,7 @@ TEST_F(Concurrency, ManyWritersAndReadersOfOneHullSeeRevisionsGrow) {
   const v1::GetHullResponse hull = Get("shared");
   EXPECT_EQ(hull.hull().counts().received(), kWriters * kChunks * 100);
 
-  // One chunk with all points gives the same hull.
+  // A single chunk with all points yields the same hull.
   Coordinates all;
   for (int w = 0; w < kWriters; ++w) {
     std::mt19937 random(w);

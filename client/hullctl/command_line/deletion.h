@@ -10,7 +10,7 @@
 
 namespace hulld {
 
-// Returns true if the user at the terminal confirms the deletion. The question states the number of
+// Returns true if the user at the terminal confirms the deletion. The prompt states the number of
 // items and the first ones. `one`, `many`: nouns such as "hull" and "hulls". INVALID_ARGUMENT,
 // advising --yes: no terminal.
 absl::StatusOr<bool> ConfirmDeletion(const Invocation& run, const std::vector<std::string>& ids,

@@ -180,7 +180,7 @@ void PrintAnswerTable(const Invocation& run, const PairArguments& arguments,
   table.Print(run.out);
 }
 
-// Returns question and answer, the input of `hullctl verify`.
+// Returns the query and its answer, the input of `hullctl verify`.
 std::string RecordJson(const v1::CheckCollisionRequest& request,
                        const v1::CheckCollisionResponse& response) {
   return JsonObject()
@@ -298,7 +298,8 @@ absl::Status RefuseConflicts(const PairArguments& arguments) {
   return absl::OkStatus();
 }
 
-// Returns the error, and adds that a name of a file was not one, if the server does not know it.
+// Returns the error. If the server does not know an ID that looks like the name of a file, adds
+// that there is no such file.
 absl::Status WithFileHint(const absl::Status& error, const PairArguments& arguments) {
   for (const std::string& name : {arguments.a, arguments.b}) {
     if (!absl::IsNotFound(error) || !PointFormatOfPath(name).ok() || IsShapeFile(name)) continue;

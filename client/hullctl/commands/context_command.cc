@@ -146,7 +146,7 @@ ExitCode Remove(const Invocation& run, const ContextArguments& arguments) {
   return ExitCode::kDone;
 }
 
-// Shows the settings in force and their sources.
+// Shows the effective settings and their sources.
 ExitCode Show(Invocation run, const ContextArguments& arguments) {
   if (!arguments.name.empty()) run.context = arguments.name;
   const absl::Status resolved = ResolveConnection(&run);

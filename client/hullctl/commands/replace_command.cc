@@ -84,7 +84,7 @@ ExitCode Replace(const Invocation& run, const ReplaceArguments& arguments) {
       skipped.skipped += counts->skipped;
       skipped.zeros += counts->zeros;
     }
-    // The writer of a pipe may have failed: replacing a hull by an empty one needs --allow-empty.
+    // The writer of a pipe may have failed: replacing a hull with an empty one needs --allow-empty.
     if (points == 0 && !arguments.allow_empty) file_error = NoPoints(arguments);
     return file_error;
   };

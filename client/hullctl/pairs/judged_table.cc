@@ -275,7 +275,7 @@ Judgement JudgeMotion(const JudgedAnswer& answer, const AnswerRow& row, double m
   Judgement judgement;
   const v1::FirstContact& truth = *row.first_contact;
   const bool touches = truth.has_contact_time();
-  // A program may give its answer in several columns; each must be right.
+  // A program may state its answer in several columns; each must be correct.
   const bool says_contact =
       answer.contact_time || answer.colliding.value_or(false) ||
       answer.relation.value_or(v1::RELATION_SEPARATED) != v1::RELATION_SEPARATED;

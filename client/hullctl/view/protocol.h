@@ -80,7 +80,7 @@ namespace hulld {
 //              requests the hulls of the pieces.
 //   {kind: "simplified", hullId, side, ...the same}: as "hull", for a simplification.
 //   {kind: "mesh", file, vertices, triangles, points}: the vertices and three indices for each
-//              triangle; `points` counts all points of the file, of which the frame may hold a
+//              triangle; `points` counts all points of the file, of which the frame may contain a
 //              part.
 //   {kind: "missing", hullId | file, message}: it does not exist.
 //

@@ -119,8 +119,8 @@ bool IsFile(const std::string& argument);
 absl::Status AddHullsAndBodies(const Client& client, const std::string& id_or_prefix,
                                ViewScene* scene);
 
-// Returns true if a file holds a scene rather than points or a mesh: by its extension, or, if that
-// is of plain text or of no known format, by its first line.
+// Returns true if a file contains a scene rather than points or a mesh: by its extension, or, if
+// that is of plain text or of no known format, by its first line.
 bool IsSceneFile(const std::string& path);
 
 // Adds the placements of a scene file (`hullctl scene --help`). INVALID_ARGUMENT names the

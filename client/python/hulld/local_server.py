@@ -179,7 +179,7 @@ class LocalServer:
 
 
 class Local:
-    """The result of local(): `with` gives a Client, `async with` an AsyncClient."""
+    """The result of local(): `with` yields a Client, `async with` an AsyncClient."""
 
     def __init__(self, server: LocalServer, client: dict[str, Any]) -> None:
         self._server = server

@@ -300,7 +300,7 @@ absl::StatusOr<std::optional<TurningSearch::Step>> TurningSearch::NextStep() {
   return FindStep(direction_);
 }
 
-// Returns true if an exact direction may give a much longer step.
+// Returns true if an exact direction may allow a much longer step.
 bool TurningSearch::IsPoor(const Step& step) const {
   // If the gap closes as before, this share of the last length is left to the contact.
   const double left = last_gap_ < kInfinity ? std::min(1.0, step.gap / last_gap_) : 1;

@@ -29,7 +29,7 @@ struct LiveParts {
   std::shared_ptr<const HullBase> base;
   // Larger levels come first.
   std::vector<std::shared_ptr<const PreparedLevel>> levels;
-  // Number of appended points that base and levels represent; the tail holds the later ones.
+  // Number of appended points that base and levels represent; the tail contains the later ones.
   uint64_t covered = 0;
   // Null while empty.
   std::shared_ptr<GrowthTail> tail;

@@ -16,7 +16,7 @@ struct Impact {
   Verdict verdict = Verdict::kApart;
   // The time of a contact.
   double time = 1;
-  // Length of the interval that is proven to hold the first contact; 0 without a proof.
+  // Length of the interval that is proven to contain the first contact; 0 without a proof.
   double bracket = 0;
 };
 

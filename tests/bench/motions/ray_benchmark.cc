@@ -44,7 +44,7 @@ constexpr int kHulls = 1000;
 constexpr int kVertices = 64;
 constexpr size_t kRays = 100'000;
 constexpr int kRounds = 3;
-// Half the side of the cube that holds the hulls, about three radii of room for each.
+// Half the side of the cube that contains the hulls, about three radii of room for each.
 constexpr double kHalf = 15;
 
 std::string HullId(size_t hull) { return "ray/" + std::to_string(hull); }

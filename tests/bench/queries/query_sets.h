@@ -42,7 +42,7 @@ struct QuerySet {
   std::vector<PlacedHull> b;
 };
 
-// Returns hulls by name. Fixed seeds: the same name and regime give the same queries.
+// Returns hulls by name. Fixed seeds: the same name and regime yield the same queries.
 //
 //   "sphere:V"  V random points on an ellipsoid with axes between 0.5 and 1.5, at random poses
 //   "ur5"       the links of the robot arm in HULLD_DATA (../shared/data), at random poses;

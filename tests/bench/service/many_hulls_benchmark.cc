@@ -4,8 +4,8 @@
 //
 // Creates N boxes (default 100000), in memory or in a RocksDB store in a new DIRECTORY. Prints a
 // CSV row for each step: heap per hull after it, bytes per hull that count against --memory-limit,
-// processor time of this process per hull, and resident memory. A question resolves all hulls in
-// one call, as a batch that names each once; `idle` is what the server does every ten seconds.
+// processor time of this process per hull, and resident memory. A query resolves all hulls in one
+// call, as a batch that names each once; `idle` is what the server does every ten seconds.
 
 #include <malloc.h>
 #include <unistd.h>

@@ -25,7 +25,7 @@ TEST(MeshVolume, DirectionDoesNotMatter) {
   EXPECT_EQ(VolumeRatio(BoxHull({0, 0, 0}, {2, 1, 1}), mesh), 2);
 }
 
-// Formats such as STL give each triangle its own corners.
+// Formats such as STL store separate corners for each triangle.
 TEST(MeshVolume, VerticesAtTheSamePositionAreOne) {
   const TriangleMesh box = BoxMesh({0, 0, 0}, {1, 1, 1});
   TriangleMesh soup;

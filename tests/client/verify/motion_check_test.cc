@@ -345,7 +345,7 @@ TEST(MotionCheck, PlanesMayTurn) {
   ExpectValid(claim(1.25, 2), kTurningRod, point);
   ExpectInvalid(claim(1.625, 1.75), kTurningRod, point, "B does not stay");
   ExpectInvalid(Separated().Until(1, {0, 1, 0}, 1.25), kTurningRod, point, "A does not stay");
-  // Both scaled alike.
+  // Both are scaled by the same factor.
   ExpectValid(Separated().Until(1, {0, 0x1p-900, 0}, 0x1.4p-900).To({-0x1p-900, 0, 0}, 0x1.4p-900),
               kTurningRod, point);
   // The radii of both count in full.

@@ -79,7 +79,7 @@ TEST(Certificate, TheTextbookMethodReturnsOneToo) {
   }
 }
 
-// Swapped hulls give the mirror image, bit for bit.
+// Swapped hulls yield the mirror image, bit for bit.
 void ExpectMirrored(const Certificate& ab, const Certificate& ba) {
   ASSERT_EQ(ab.direction.index(), ba.direction.index());
   if (const Vector* n = std::get_if<Vector>(&ab.direction)) {

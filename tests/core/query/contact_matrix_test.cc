@@ -203,8 +203,8 @@ TEST(ContactMatrix, CommonPosesTouchExactlyAndOneStepDecides) {
 }
 
 // Rounded coordinates: offset and scale inside the hulls themselves, unrotated and at quarter
-// turns, with one coordinate of B's contact moved by one unit in the last place. The oracle gives
-// the expected answers.
+// turns, with one coordinate of B's contact moved by one unit in the last place. The oracle
+// provides the expected answers.
 TEST(ContactMatrix, RoundedCoordinatesAreAnsweredExactly) {
   const uint64_t seed = TestSeed(403);
   Random random(seed);

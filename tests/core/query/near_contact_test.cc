@@ -28,7 +28,7 @@ Relation Ask(const Hull& a, const Pose& X_WA, const Hull& b, const Pose& X_WB) {
 
 // Moves B along a line from overlap to separation and bisects the change of the relation, down to
 // two translations that are a few units in the last place apart: the hardest generic queries, in
-// which no coordinate is special. The bisection trusts core; the oracle then gives the expected
+// which no coordinate is special. The bisection trusts core; the oracle then provides the expected
 // answers.
 class Narrowing {
  public:

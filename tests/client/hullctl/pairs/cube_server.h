@@ -10,7 +10,7 @@
 
 namespace hulld {
 
-// hullctl, a server that holds the unit cube "cube", and a temporary folder of input files.
+// hullctl, a server with the unit cube "cube", and a temporary folder of input files.
 class CubeServer : public HullctlOnServer {
  protected:
   CubeServer() {

@@ -27,7 +27,7 @@ class PictureTest(viewer_case.ViewerCase):
             self.browser.js("(() => { const {model} = hulldViewer; hulldViewer.setTheme(arguments[0]);"
                             " model.show = {...model.show, edges: false, labels: false, grid: false};"
                             " model.select(null); model.tell('shown'); })()", theme)
-            # The ground and three faces: each has one color, with a brightness of its own.
+            # The ground and three faces: each has a single color, each with a different brightness.
             shades = sorted(self.count_pixels(
                 "r + g + b",
                 "[...counts].filter(([, count]) => count > 0.01 * total).map(([sum]) => sum)"))

@@ -300,7 +300,7 @@ TEST(DegenerateHull, SnapshotsAreCanonicalForAnyDistributionOfX) {
 }
 
 // Streams with first blocks unlike the last: clusters far apart, growing shells, flat starts. Any
-// split into blocks gives the hull of a single block.
+// split into blocks yields the hull of a single block.
 TEST(DegenerateHull, StreamsOfDissimilarBlocksEqualOneBlock) {
   const uint64_t seed = TestSeed(211);
   Random random(seed);

@@ -65,7 +65,7 @@ double Support(const Hull& hull, const Vector& n) {
 }
 
 // The Hausdorff distance of nested convex sets is the largest difference of their support
-// functions; sampling some directions gives a lower bound.
+// functions; sampling some directions yields a lower bound.
 double MinHausdorffDistance(const Hull& inner, const Hull& outer) {
   double most = 0;
   for (const Vector& n : Sphere(3000, 99)) {

@@ -14,8 +14,8 @@ const MAX_PIECE_ROWS = 100;
 const INDENT = 12;
 
 // Groups objects by the segments of their names. Returns {prefix, members, groups}: `members` lie
-// directly under the prefix, and `groups` hold the remaining objects. A group whose only content is
-// another group is merged with it.
+// directly under the prefix, and `groups` contain the remaining objects. A group whose only content
+// is another group is merged with it.
 function treeOf(objects, prefix = '') {
   const members = [];
   const rest = new Map();

@@ -203,7 +203,7 @@ class MovingPair {
   }
 
   // Contact of a translation between two times. All differences of vertices move alike, so their
-  // hulls at these times span all hulls in between; one of them holds 0 if the span does.
+  // hulls at these times span all hulls in between; one of them contains 0 if the span does.
   checkBriefContact(bracket, certificate) {
     const span = bracket.flatMap(
         (time) => differences(MAX_PAIRS.RELATION_TOUCHING, certificate, ...this.hullsAt(time)));
