@@ -93,8 +93,8 @@ void AddGenerateCommand(Command program, Invocation* invocation) {
   command.AddText("-o,--out", &arguments->file, "File to write (default: standard output)")
       .ValueName("FILE");
   command.SetDetails(
-      "The same options give the same bytes on every machine. A lattice of N points is the first\n"
-      "N of the smallest cube of k*k*k points; N = k*k*k gives a whole cube.");
+      "The same options produce the same bytes on every machine. A lattice of N points is the\n"
+      "first N points of the smallest cube of k*k*k points; N = k*k*k results in a whole cube.");
   command.SetExamples(
       {{"A cube of edge 2", "hullctl generate lattice 27 | hullctl append cube - --create"},
        {"A hundred thousand points in a ball", "hullctl generate ball 100000 -o ball.xyz"}});

@@ -647,7 +647,7 @@ TEST_F(PostgresShared, ARestoredDatabaseIsADifferentStoreForAllServers) {
   Ask("UPDATE hulld.store SET batch = batch - 1");
   EXPECT_TRUE(absl::IsUnavailable(hulls_->Put("h", {{9, 9, 9}}).status()));
   EXPECT_TRUE(ended);
-  // It detects the new ID at the latest.
+  // Now, at the latest, the peer detects the new ID.
   EXPECT_TRUE(absl::IsUnavailable(other->View("h").status()));
   Start();
   EXPECT_NE(hulls_->store().id(), id);
