@@ -15,7 +15,7 @@ namespace {
 
 constexpr int kMeshReadAttempts = 5;
 
-constexpr char kOtherStore[] = "the server's store differs from the answer's";
+constexpr char kOtherStore[] = "the server's store is not the one that the answer came from";
 
 // Returns true if a hull or a body is still at that version.
 template <typename Info>

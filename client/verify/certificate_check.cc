@@ -45,7 +45,7 @@ absl::Status CheckVertex(uint32_t index, bool has_vertex, const v1::Vector3& ver
   const double* const p = xyz.data() + 3 * size_t{index};
   if (has_vertex && (vertex.x() != p[0] || vertex.y() != p[1] || vertex.z() != p[2])) {
     return ProofFails(
-        absl::StrCat(name, " has other coordinates than vertex ", index, " of the hull"));
+        absl::StrCat(name, " does not have the coordinates of vertex ", index, " of the hull"));
   }
   return absl::OkStatus();
 }

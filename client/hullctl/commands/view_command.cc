@@ -193,7 +193,7 @@ class Viewing {
     if (watch->is_of_pairs && watch->placements > scene->objects.size()) {
       return absl::InvalidArgumentError(absl::StrCat(
           path, " records a watch of another scene: it contains placement ", watch->placements - 1,
-          ", but the indices of ", things[0], " end at ", scene->objects.size() - 1));
+          ", counted from 0, but ", things[0], " has only ", scene->objects.size()));
     }
     scene->watch = std::move(watch->messages);
     scene->note = absl::StrCat("A recorded watch: the timeline shows the ",

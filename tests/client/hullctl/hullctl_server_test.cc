@@ -89,7 +89,7 @@ TEST_F(HullctlQuestions, VerifyDistinguishesValidInvalidAndUncheckable) {
   const TempFile elsewhere("elsewhere.json", Recorded(request, response));
   ran = Ask({"verify", elsewhere.path()});
   EXPECT_EQ(ran.code, 6);
-  EXPECT_THAT(ran.err, HasSubstr("the server's store differs"));
+  EXPECT_THAT(ran.err, HasSubstr("the server's store is not the one"));
 
   server::Appender appender(*hulls_, "cube", "w");
   ASSERT_TRUE(appender.Append(1, {9, 9, 9}).has_value());

@@ -240,7 +240,7 @@ TEST(CertificateCheck, PairsMustBeVerticesOfTheHulls) {
   named.mutable_pairs(0)->mutable_vertex_b();
   ExpectValid(kTouching, named, a, b);
   named.mutable_pairs(0)->mutable_vertex_a()->set_y(kMin);
-  ExpectInvalid(kTouching, named, a, b, "pairs[0].a has other coordinates");
+  ExpectInvalid(kTouching, named, a, b, "pairs[0].a does not have the coordinates");
 }
 
 TEST(CertificateCheck, PointsInAnyOrderAreFoundByTheirCoordinates) {

@@ -172,7 +172,7 @@ TEST_F(Touching, AMovedVertexIsNoticed) {
   v1::PieceCertificate named = Contact();
   named.mutable_certificate()->mutable_pairs(0)->mutable_vertex_a()->set_x(7);
   EXPECT_THAT(Fault(kTouching, {named, Beside()}, a_, b_),
-              HasSubstr("pieces 1 of A and 0 of B: pairs[0].a has other coordinates"));
+              HasSubstr("pieces 1 of A and 0 of B: pairs[0].a does not have the coordinates"));
 }
 
 TEST_F(Touching, AnotherRelationIsRefused) {

@@ -67,7 +67,7 @@ class Piece:
             raise VerificationError("a vertex pair refers to a vertex that does not exist")
         if not (self._vertices[index] == vertex).all():
             raise VerificationError(
-                f"a vertex pair has coordinates that differ from those of vertex {index}"
+                f"a vertex pair does not have the coordinates of vertex {index}"
             )
         return self.points[index]
 

@@ -178,7 +178,7 @@ TEST_F(Continuous, IncompatibleOptionsAreRefused) {
   };
   EXPECT_THAT(error("hinge\n0\n", {}), HasSubstr("pass at least two with --joints"));
   EXPECT_THAT(error(kSwingPast, {"--separation"}), HasSubstr("--continuous finds first contacts"));
-  EXPECT_THAT(error(kSwingPast, {"--tolerance", "0.1"}), HasSubstr("no --tolerance"));
+  EXPECT_THAT(error(kSwingPast, {"--tolerance", "0.1"}), HasSubstr("not with --tolerance"));
   EXPECT_THAT(error("hinge\n0\n1e300\n", {}), HasSubstr("between waypoints 1 and 2; add"));
   EXPECT_EQ(Check(Swing("1.8"), kSwingPast, {"--resolution", "1"}).code, 2);
 }

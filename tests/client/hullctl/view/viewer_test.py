@@ -472,7 +472,7 @@ class ViewerTest(viewer_case.ViewerCase):
         append = self.browser.driver.find_element(By.ID, "edit-append")
         points.send_keys("0 0 five")
         append.click()
-        self.assertIn("is not three comma-separated numbers", self.browser.text("#edit-result"))
+        self.assertIn("is not three numbers", self.browser.text("#edit-result"))
         points.clear()
         points.send_keys("0 0 5.1\n0, 0, 0")
         append.click()

@@ -119,7 +119,7 @@ class WatchTest(viewer_case.ViewerCase):
         self.file("broken.jsonl", '{"events": 3}\n')
         for arguments, complaint in (
                 (["box", "--recording", recording], "records a watch of a scene; pass the scene file"),
-                (["short.yaml", "--recording", recording], "it has placement 2, but short.yaml ends"),
+                (["short.yaml", "--recording", recording], "placement 2, counted from 0, but short.yaml has only 2"),
                 (["--demo", "--recording", recording], "cannot be combined with --demo"),
                 (["box", "--recording", "empty.jsonl"], "contains no event"),
                 (["box", "--recording", "broken.jsonl"], "broken.jsonl:1: not a line of"),

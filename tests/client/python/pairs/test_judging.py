@@ -104,7 +104,7 @@ def test_rows_without_an_exact_answer_fail_alone(client: hulld.Client) -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"colliding": None}, "needs an answer"),
+        ({"colliding": None}, "needs a column of answers"),
         ({"b": None}, "needs the column 'b'"),
         ({"solver": ["x"]}, "no column 'solver'"),
         ({"colliding": ["maybe"]}, r"colliding\[0\] is 'maybe'"),

@@ -138,7 +138,7 @@ function checkVertex(index, vertex, {xyz}, name) {
   const count = xyz.length / 3;
   require(index < count, `${name} is vertex ${index}, but the hull has ${count}`);
   const isSame = !vertex || numbersOf(vertex).every((value, k) => value === xyz[3 * index + k]);
-  require(isSame, `${name} has other coordinates than vertex ${index} of the hull`);
+  require(isSame, `${name} does not have the coordinates of vertex ${index} of the hull`);
 }
 
 // Returns the points of A - B that the vertex pairs name, times both scales.
