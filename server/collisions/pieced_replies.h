@@ -104,6 +104,8 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     int max_short_placements;
     // True if the first answers may join the last message of the head.
     bool joins_head;
+    // Steps of the fastest kind between two reads of the clock.
+    uint64_t steps_per_look;
   };
 
   PiecedReplies(const Bytes& request, CallContext& context, Rpc rpc, const CollisionParts& parts,
@@ -155,8 +157,6 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   // at most: adds rows, counts rungs, and advances `next` when the unit is done. Called without the
   // mutex, on any thread, but never concurrently for the same piece.
   virtual absl::Status Step(Work& piece, Clock::time_point end) = 0;
-  // Steps between two reads of the clock.
-  virtual uint64_t StepsPerLook() const = 0;
 
   // Ends a row of the piece. bytes: as returned by AddAnswer.
   void EndRow(Work& piece, size_t bytes) {
@@ -168,8 +168,6 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
 
   // Number of units. Requires that the call is prepared.
   virtual uint64_t CountUnits() = 0;
-  // Returns true if a slice of a piece may start while earlier pieces are in flight.
-  virtual bool MayRunAhead() const { return true; }
   // Queues the replies of the front piece, in order. Called one last time when the piece is done.
   virtual void Deliver(Work& piece) {
     for (size_t i = 0; i < piece.replies.size(); ++i) {
@@ -180,23 +178,25 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     piece.reply_bytes.clear();
     piece.bytes = 0;
   }
-  // Merges a small reply into the queued one; returns false if they do not fit.
-  virtual bool Join(const Reply& reply, Reply* waiting) = 0;
   // Called after all pieces are delivered. Returns the number of further units, which exist only
   // from then on; 0 if there are none.
   virtual uint64_t CountFollowingUnits() { return 0; }
   // Called when no units are left, to queue a final message; the end is set afterwards.
   virtual void OnAllDelivered() {}
 
+  // Queues a reply, or merges it into the last queued one if both are small and fit together.
   void QueueOrJoin(Reply reply, size_t bytes) {
+    Reply* const waiting = this->LastWaiting();
     const bool is_small =
         bytes <= kSmallReplyBytes && this->LastWaitingBytes() + bytes <= Config::kReplyMessageBytes;
-    Reply* const waiting = this->LastWaiting();
-    if (is_small && waiting != nullptr && Join(reply, waiting)) {
-      this->GrowLastWaiting(bytes);
-    } else {
-      this->Queue(std::move(reply), bytes);
-    }
+    if (!is_small || waiting == nullptr) return this->Queue(std::move(reply), bytes);
+    const bool is_head = waiting->columns().relations().empty();
+    const bool fits = is_head ? shape_.joins_head : !NamesRows(reply.columns());
+    if (!fits) return this->Queue(std::move(reply), bytes);
+    // The merged message keeps its first pair.
+    if constexpr (requires { reply.clear_first_pair(); }) reply.clear_first_pair();
+    waiting->MergeFrom(reply);
+    this->GrowLastWaiting(bytes);
   }
 
   // Written before the first piece.
@@ -276,9 +276,9 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
 
   // Works on the piece until `end`, or until it is done.
   absl::Status Advance(Work& piece, Clock::time_point end) {
-    const uint64_t steps = StepsPerLook();
+    const bool is_quick = AsksRelationsOfHulls(query_, table_);
     do {
-      for (uint64_t left = steps; left > 0 && !piece.is_done(); --left) {
+      for (uint64_t left = is_quick ? shape_.steps_per_look : 1; left > 0 && !piece.is_done(); --left) {
         HULLD_RETURN_IF_ERROR(Step(piece, end));
       }
     } while (!piece.is_done() && Clock::now() < end);
@@ -358,10 +358,12 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
       next_unit_ = piece->end;
       pieces_.push_back(std::move(piece));
     }
+    // A textbook pair holds memory once started, so only one is started at a time.
+    const bool is_textbook = query_.method == Method::kTextbookSat;
     for (const std::unique_ptr<Work>& piece : pieces_) {
       if (piece->is_running || piece->is_done()) continue;
       const bool is_front = piece == pieces_.front();
-      if (!is_front && (piece->bytes >= kMaxHeldBytes || !MayRunAhead())) continue;
+      if (!is_front && (piece->bytes >= kMaxHeldBytes || is_textbook)) continue;
       piece->is_running = true;
       ++running_;
       this->RunOn(lane_, [this, each = piece.get()] { RunSlice(*each); });

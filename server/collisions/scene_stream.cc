@@ -48,7 +48,8 @@ SceneStream::SceneStream(CallContext& context, const CollisionParts& parts, cons
                     {.first_units = kFirstPlacements,
                      .max_units = kMaxPlacements,
                      .max_short_placements = kMaxBoxesPerSlice,
-                     .joins_head = false}) {}
+                     .joins_head = false,
+                     .steps_per_look = kStepsPerPoll}) {}
 
 absl::Status SceneStream::Validate() {
   HULLD_RETURN_IF_ERROR(DecodePlacements(v1::METHOD_UNSPECIFIED, "the scene"));
@@ -110,15 +111,15 @@ absl::Status SceneStream::Prepare() {
     }
   });
   if (call().ShouldStop()) return call().StopStatus();
+  ranked_query_ = query_;
   if (request().has_limit()) {
     ranking_ =
         std::make_unique<RankedPairs>(request().limit(), boxes, query_.max_error.value_or(0));
-    ranked_query_ = std::exchange(query_, WithoutDetails(query_));
+    query_ = WithoutDetails(query_);
   }
   if (request().first_only()) {
     ranking_ =
         std::make_unique<RankedPairs>(MemoryCharge(registry().memory(), MemoryUse::kReading));
-    ranked_motion_ = motion_options_;
     motion_options_.want_certificate = false;
   }
   options_.query = query_;
@@ -134,11 +135,6 @@ size_t SceneStream::HeldBytes() const {
   if (!search_.has_value()) return bytes;
   if (request().has_limit()) bytes += ranking_->MaxMemoryBytes(search_->pairs());
   return bytes + search_->MemoryBytes();
-}
-
-uint64_t SceneStream::StepsPerLook() const {
-  const bool is_quick = ranked_.empty() && !table_.has_bodies() && !table_.has_motions();
-  return is_quick ? kStepsPerPoll : 1;
 }
 
 absl::Status SceneStream::Step(ScenePiece& piece, Clock::time_point /*end*/) {
@@ -170,8 +166,8 @@ absl::Status SceneStream::Step(ScenePiece& piece, Clock::time_point /*end*/) {
 absl::Status SceneStream::AnswerRanked(ScenePiece& piece) {
   const RankedPair& pair = ranked_[piece.next - search_->size()];
   const PlacedAnswer found = request().first_only()
-                                 ? AskFirst(pair.a, pair.b, ranked_motion_)
-                                 : AskPlaced(table_, pair.a, pair.b, ranked_query_, ranked_motion_);
+                                 ? AskFirst(pair.a, pair.b, motion_options_)
+                                 : AskPlaced(table_, pair.a, pair.b, query_, motion_options_);
   if (absl::IsCancelled(found.answer.status())) return found.answer.status();
   ++piece.next;
   // The pair was ranked, or failed, before the first contact was known.
@@ -273,10 +269,10 @@ absl::Status SceneStream::AdvanceBodies(uint32_t a, ScenePiece& piece) {
 }
 
 uint64_t SceneStream::CountFollowingUnits() {
-  if (ranking_ == nullptr) return 0;
-  std::vector<RankedPair> ranked = ranking_->Take();
-  if (ranked.empty()) return 0;
-  ranked_ = std::move(ranked);
+  if (ranking_ == nullptr || !ranked_.empty()) return 0;
+  ranked_ = ranking_->Take();
+  query_ = ranked_query_;
+  motion_options_.want_certificate = query_.want_certificate;
   return ranked_.size();
 }
 
@@ -297,14 +293,6 @@ void SceneStream::Deliver(ScenePiece& piece) {
   counts_.candidates += counts.candidates;
   for (size_t i = 0; i < counts.found.size(); ++i) counts_.found[i] += counts.found[i];
   PiecedReplies::Deliver(piece);
-}
-
-// Messages of the head contain no answers.
-bool SceneStream::Join(const v1::FindCollisionsResponse& reply,
-                       v1::FindCollisionsResponse* waiting) {
-  if (waiting->pairs_size() == 0 || NamesRows(reply.columns())) return false;
-  waiting->MergeFrom(reply);
-  return true;
 }
 
 void SceneStream::OnAllDelivered() {

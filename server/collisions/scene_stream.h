@@ -64,13 +64,11 @@ class SceneStream
   absl::Status Validate() override;
   absl::Status Prepare() override;
   absl::Status Step(ScenePiece& piece, Clock::time_point end) override;
-  uint64_t StepsPerLook() const override;
   size_t HeldBytes() const override;
   // The functions below require the mutex.
   uint64_t CountUnits() override { return search_->size(); }
   uint64_t CountFollowingUnits() override;
   void Deliver(ScenePiece& piece) override;
-  bool Join(const v1::FindCollisionsResponse& reply, v1::FindCollisionsResponse* waiting) override;
   void OnAllDelivered() override;
 
   // Called without the mutex.
@@ -101,7 +99,6 @@ class SceneStream
   // With a limit or first_only: the query of the pairs that are answered at the end, and the pairs
   // ranked so far.
   QueryOptions ranked_query_;
-  MotionOptions ranked_motion_;
   std::unique_ptr<RankedPairs> ranking_;
   // Written before the first piece of ranked pairs.
   std::vector<RankedPair> ranked_;
