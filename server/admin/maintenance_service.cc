@@ -39,12 +39,8 @@ absl::Status CheckSeesAll(const Caller& caller) {
 class BackupStream : public RequestStream<PulledStream<WriteReactor, v1::SaveBackupResponse>,
                                           v1::SaveBackupRequest> {
  public:
-  BackupStream(CallContext& context, Admission& admission, Store& store, const Registry& registry,
-               TaskPool& readers, const Bytes& request)
-      : RequestStream(request, context, admission, Rpc::kSaveBackup),
-        store_(store),
-        registry_(registry),
-        readers_(readers) {}
+  BackupStream(CallContext& context, const ServiceParts& parts, const Bytes& request)
+      : RequestStream(request, context, parts.admission, Rpc::kSaveBackup), parts_(parts) {}
   ~BackupStream() override {
     std::error_code error;
     if (!directory_.empty()) std::filesystem::remove_all(directory_, error);
@@ -53,7 +49,7 @@ class BackupStream : public RequestStream<PulledStream<WriteReactor, v1::SaveBac
  private:
   void Open() override {
     if (absl::Status s = CheckSeesAll(call().caller()); !s.ok()) return FinishCall(s);
-    RunOn(readers_, [this] {
+    RunOn(parts_.long_readers, [this] {
       if (absl::Status s = Begin(); !s.ok()) return FinishCall(s);
       Send();
     });
@@ -61,7 +57,7 @@ class BackupStream : public RequestStream<PulledStream<WriteReactor, v1::SaveBac
 
   // Makes the copy, and the first message.
   absl::Status Begin() {
-    HULLD_ASSIGN_OR_RETURN(directory_, store_.MakeCopy());
+    HULLD_ASSIGN_OR_RETURN(directory_, parts_.store.MakeCopy());
     std::error_code error;
     for (auto entry = std::filesystem::recursive_directory_iterator(directory_, error);
          !error && entry != std::filesystem::recursive_directory_iterator();
@@ -76,7 +72,7 @@ class BackupStream : public RequestStream<PulledStream<WriteReactor, v1::SaveBac
     std::sort(files_.rbegin(), files_.rend());
     spdlog::info("sending a backup of the store");
     v1::BackupBegin* begin = reply().mutable_begin();
-    EncodeHeader(registry_.store(), registry_.Sizes().store_revision, begin->mutable_header());
+    EncodeHeader(parts_.store, parts_.registry.Sizes().store_revision, begin->mutable_header());
     begin->set_version(HULLD_VERSION);
     begin->set_store_format(kStoreFormat);
     return absl::OkStatus();
@@ -84,7 +80,7 @@ class BackupStream : public RequestStream<PulledStream<WriteReactor, v1::SaveBac
 
   // Runs on a reader thread, since it reads files.
   void OnSent() override {
-    RunOn(readers_, [this] {
+    RunOn(parts_.long_readers, [this] {
       const absl::StatusOr<bool> more = NextMessage();
       if (!more.ok()) return FinishCall(more.status());
       if (!*more) {
@@ -134,9 +130,7 @@ class BackupStream : public RequestStream<PulledStream<WriteReactor, v1::SaveBac
     return true;
   }
 
-  Store& store_;
-  const Registry& registry_;
-  TaskPool& readers_;
+  const ServiceParts& parts_;
   std::string directory_;
   // Paths relative to directory_. The last one is sent first.
   std::vector<std::string> files_;
@@ -149,8 +143,7 @@ class BackupStream : public RequestStream<PulledStream<WriteReactor, v1::SaveBac
 }  // namespace
 
 WriteReactor* MaintenanceService::SaveBackup(CallContext* context, const Bytes* request) {
-  return BackupStream::Launch(
-      std::make_shared<BackupStream>(*context, admission_, store_, registry_, readers_, *request));
+  return BackupStream::Launch(std::make_shared<BackupStream>(*context, parts_, *request));
 }
 
 }  // namespace hulld::server

@@ -20,7 +20,7 @@ constexpr uint64_t kPairsPerPoll = 64;
 
 }  // namespace
 
-BatchStream::BatchStream(CallContext& context, const CollisionParts& parts, const Bytes& request)
+BatchStream::BatchStream(CallContext& context, const ServiceParts& parts, const Bytes& request)
     : PiecedReplies(request, context, Rpc::kBatchCheckCollisions, parts,
                     {.first_units = kFirstPairs,
                      .max_units = kMaxPairs,

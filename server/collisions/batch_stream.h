@@ -28,7 +28,7 @@ struct PairsPiece : Piece<v1::BatchCheckCollisionsResponse> {
 class BatchStream : public PiecedReplies<v1::BatchCheckCollisionsRequest,
                                          v1::BatchCheckCollisionsResponse, PairsPiece> {
  public:
-  BatchStream(CallContext& context, const CollisionParts& parts, const Bytes& request);
+  BatchStream(CallContext& context, const ServiceParts& parts, const Bytes& request);
 
  private:
   absl::Status Validate() override;

@@ -107,7 +107,7 @@ void CollisionStream::AnswerMessage(absl::Status status) {
   if (!status.ok()) return FinishCall(OrStopped(status));
   request().Clear();
   pairs_.SortSelected();
-  table_.EncodeHeader(parts_.registry.store(), reply().mutable_header());
+  table_.EncodeHeader(parts_.store, reply().mutable_header());
   reply_bytes_ = reply().ByteSizeLong();
   call().AddPairs(pairs_.selected().size());
   AnswerSlice();
@@ -133,8 +133,8 @@ absl::Status CollisionStream::HandleOpen() {
   HULLD_ASSIGN_OR_RETURN(QueryOptions options,
                          MakeQueryOptions(v1::METHOD_UNSPECIFIED, open.wanted(), open.tolerance(),
                                           parts_.registry.limits(), call().lifetime()));
-  HULLD_ASSIGN_OR_RETURN(freshness_, DecodeFreshness(open.freshness(), parts_.registry.store(),
-                                                     call().message_arrival()));
+  HULLD_ASSIGN_OR_RETURN(freshness_,
+                         DecodeFreshness(open.freshness(), parts_.store, call().message_arrival()));
   const absl::Status resting =
       RefuseMotions(open.placements(), open.packed_placements(), "a stream");
   if (!resting.ok()) return resting;

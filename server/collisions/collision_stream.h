@@ -13,8 +13,8 @@
 #include "core/query/collision.h"
 #include "hulld/v1/collision.pb.h"
 #include "server/call/pulled_stream.h"
+#include "server/call/service_parts.h"
 #include "server/collisions/claimed_range.h"
-#include "server/collisions/placed/collision_parts.h"
 #include "server/collisions/placed/live_pairs.h"
 #include "server/collisions/placed/placement_table.h"
 #include "server/collisions/placed/query_settings.h"
@@ -32,7 +32,7 @@ class CollisionStream
     : public ReadingStream<PulledStream<BidiReactor, v1::StreamCollisionsResponse>,
                            v1::StreamCollisionsRequest> {
  public:
-  CollisionStream(CallContext& context, const CollisionParts& parts)
+  CollisionStream(CallContext& context, const ServiceParts& parts)
       : ReadingStream(context, parts.admission, Rpc::kStreamCollisions),
         parts_(parts),
         lane_(parts.pool),
@@ -72,7 +72,7 @@ class CollisionStream
   void SendAnswered();
   void SendPart(bool last);
 
-  const CollisionParts& parts_;
+  const ServiceParts& parts_;
   // Slices of long answers.
   TaskPool::Lane lane_;
   // Covers placements and pairs.

@@ -46,7 +46,7 @@ absl::Status EncodeAnswer(const hulld::Answer& answer, const QueryHull& a, const
 
 }  // namespace
 
-void PairQuestion::Start(const CollisionParts& parts, CheckCall* call) {
+void PairQuestion::Start(const ServiceParts& parts, CheckCall* call) {
   parts.pool.NoteSingleCall();
   const std::shared_ptr<PairQuestion> question(new PairQuestion(parts, call));
   if (absl::Status s = question->ReadRequest(); !s.ok()) return call->End(s);
@@ -84,9 +84,8 @@ absl::Status PairQuestion::ReadRequest() {
     HULLD_RETURN_IF_ERROR(ValidateForMotions(options_));
     motion_options_ = MakeMotionOptions(request.wanted(), options_);
   }
-  HULLD_ASSIGN_OR_RETURN(
-      const Freshness freshness,
-      DecodeFreshness(request.freshness(), parts_.registry.store(), call.arrival()));
+  HULLD_ASSIGN_OR_RETURN(const Freshness freshness,
+                         DecodeFreshness(request.freshness(), parts_.store, call.arrival()));
   plan_.freshness = freshness;
   return absl::OkStatus();
 }
@@ -121,7 +120,7 @@ absl::Status PairQuestion::Begin() {
     if (!table_.is_answerable(i)) return table_.problem(i);
   }
   v1::CheckCollisionResponse& response = call_->response();
-  table_.EncodeHeader(parts_.registry.store(), response.mutable_header());
+  table_.EncodeHeader(parts_.store, response.mutable_header());
   table_.EncodeHull(*table_.hull_of(kA), response.mutable_hull_a());
   table_.EncodeHull(*table_.hull_of(kB), response.mutable_hull_b());
   search_.emplace(table_, kA, kB, options_, motion_options_);
@@ -178,7 +177,7 @@ absl::Status PairQuestion::EncodeProof() {
   const auto encode = [&](const HullView& hull) {
     const std::string& id = hull.record.hull_id;
     if (id.empty() || !known.insert(id).second) return;
-    EncodeVersion(parts_.registry.store(), hull.record, response.add_piece_hulls());
+    EncodeVersion(parts_.store, hull.record, response.add_piece_hulls());
   };
   for (const uint32_t i : {kA, kB}) {
     const HullView& view = *table_.hull(*table_.hull_of(i));

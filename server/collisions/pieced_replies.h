@@ -18,7 +18,7 @@
 #include "core/base/check.h"
 #include "core/base/status_macros.h"
 #include "server/call/queued_stream.h"
-#include "server/collisions/placed/collision_parts.h"
+#include "server/call/service_parts.h"
 #include "server/collisions/placed/placement_table.h"
 #include "server/collisions/placed/query_settings.h"
 #include "server/process/shared_loop.h"
@@ -108,7 +108,7 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     uint64_t steps_per_look;
   };
 
-  PiecedReplies(const Bytes& request, CallContext& context, Rpc rpc, const CollisionParts& parts,
+  PiecedReplies(const Bytes& request, CallContext& context, Rpc rpc, const ServiceParts& parts,
                 const Shape& shape)
       : Base(request, context, parts.admission, rpc),
         parts_(parts),
@@ -132,8 +132,8 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     const Request& request = this->request();
     HULLD_ASSIGN_OR_RETURN(query_, MakeQueryOptions(method, request.wanted(), request.tolerance(),
                                                     registry().limits(), this->call().lifetime()));
-    HULLD_ASSIGN_OR_RETURN(freshness_, DecodeFreshness(request.freshness(), registry().store(),
-                                                       this->call().arrival()));
+    HULLD_ASSIGN_OR_RETURN(
+        freshness_, DecodeFreshness(request.freshness(), parts_.store, this->call().arrival()));
     HULLD_ASSIGN_OR_RETURN(
         table_,
         PlacementTable::Make(request.placements(), *this->own_request().mutable_packed_placements(),
@@ -278,7 +278,8 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   absl::Status Advance(Work& piece, Clock::time_point end) {
     const bool is_quick = AsksRelationsOfHulls(query_, table_);
     do {
-      for (uint64_t left = is_quick ? shape_.steps_per_look : 1; left > 0 && !piece.is_done(); --left) {
+      for (uint64_t left = is_quick ? shape_.steps_per_look : 1; left > 0 && !piece.is_done();
+           --left) {
         HULLD_RETURN_IF_ERROR(Step(piece, end));
       }
     } while (!piece.is_done() && Clock::now() < end);
@@ -316,7 +317,7 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   // of the table follows.
   bool QueueHead() {
     Reply head;
-    if (next_row_ == 0) table_.EncodeHeader(registry().store(), head.mutable_header());
+    if (next_row_ == 0) table_.EncodeHeader(parts_.store, head.mutable_header());
     next_row_ = table_.EncodeHulls(next_row_, &head);
     const size_t bytes = head.ByteSizeLong();
     this->Queue(std::move(head), bytes);
@@ -380,7 +381,7 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
         static_cast<uint64_t>(std::clamp(wanted, 1.0, static_cast<double>(shape_.max_units)));
   }
 
-  const CollisionParts& parts_;
+  const ServiceParts& parts_;
   TaskPool::Lane lane_;
   const size_t max_pieces_;
   const Shape shape_;

@@ -43,7 +43,7 @@ QueryOptions WithoutDetails(QueryOptions options) {
 
 }  // namespace
 
-SceneStream::SceneStream(CallContext& context, const CollisionParts& parts, const Bytes& request)
+SceneStream::SceneStream(CallContext& context, const ServiceParts& parts, const Bytes& request)
     : PiecedReplies(request, context, Rpc::kFindCollisions, parts,
                     {.first_units = kFirstPlacements,
                      .max_units = kMaxPlacements,

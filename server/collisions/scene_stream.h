@@ -58,7 +58,7 @@ struct ScenePiece : Piece<v1::FindCollisionsResponse> {
 class SceneStream
     : public PiecedReplies<v1::FindCollisionsRequest, v1::FindCollisionsResponse, ScenePiece> {
  public:
-  SceneStream(CallContext& context, const CollisionParts& parts, const Bytes& request);
+  SceneStream(CallContext& context, const ServiceParts& parts, const Bytes& request);
 
  private:
   absl::Status Validate() override;

@@ -42,7 +42,7 @@ void AppendStream::OnDone() {
   Locked([this] {
     if (!session_.has_value()) return;
     LogApplied();
-    registry_.hulls().CloseAppend(*session_);
+    parts_.registry.hulls().CloseAppend(*session_);
   });
 }
 
@@ -90,7 +90,7 @@ void AppendStream::HandleOpen(const v1::AppendOpen& open) {
     self.Locked([&] { self.Fail(reason); });
   };
   hull_id_ = open.hull_id();
-  registry_.hulls().OpenAppend(
+  parts_.registry.hulls().OpenAppend(
       open.hull_id(), writer_id_, open.create_if_absent(), on_gone,
       [this, self = shared_from_this()](const absl::StatusOr<OpenResult>& opened) {
         Locked([&] {
@@ -110,7 +110,7 @@ void AppendStream::HandleOpened(const absl::StatusOr<OpenResult>& opened) {
   if (end().has_value()) return;
   v1::AppendPointsResponse opened_reply;
   v1::AppendOpened* reply = opened_reply.mutable_opened();
-  EncodeHeader(registry_.store(), opened->store_revision, reply->mutable_header());
+  EncodeHeader(parts_.store, opened->store_revision, reply->mutable_header());
   EncodeRecord(opened->hull, reply->mutable_hull());
   reply->set_writer_id(writer_id_);
   reply->set_last_sequence(opened->last_sequence);
@@ -121,7 +121,7 @@ void AppendStream::HandleChunk(const v1::AppendChunk& message) {
   if (!session_.has_value()) {
     return Fail(absl::InvalidArgumentError("the first message must be open, not a chunk"));
   }
-  absl::StatusOr<Chunk> chunk = DecodeChunk(message, registry_.limits().max_points_per_chunk);
+  absl::StatusOr<Chunk> chunk = DecodeChunk(message, parts_.registry.limits().max_points_per_chunk);
   if (!chunk.ok()) return Fail(chunk.status());
   request().Clear();
   ++unbuilt_;
@@ -131,7 +131,7 @@ void AppendStream::HandleChunk(const v1::AppendChunk& message) {
   const uint64_t sequence = chunk->sequence;
   const uint64_t number = results_.Number();
   const auto arrival = std::chrono::steady_clock::now();
-  registry_.hulls().Append(
+  parts_.registry.hulls().Append(
       *session_, *std::move(chunk), [this, self] { return call().ShouldStop(); },
       [this, self] { Locked([this] { --unbuilt_; }); },
       [this, self, sequence, number, arrival](const absl::StatusOr<ChunkResult>& result) {
@@ -163,13 +163,13 @@ void AppendStream::HandleResult(const SequenceResult& chunk) {
   if (LastWaiting() == nullptr) Queue({});
   HULLD_CHECK(!LastWaiting()->has_opened());
   v1::AppendAck* ack = LastWaiting()->mutable_ack();
-  EncodeHeader(registry_.store(), result->store_revision, ack->mutable_header());
+  EncodeHeader(parts_.store, result->store_revision, ack->mutable_header());
   ack->set_sequence(std::max(ack->sequence(), sequence));
   if (ack->outcome() != v1::APPEND_OUTCOME_APPLIED) {
     ack->set_outcome(result->already_applied ? v1::APPEND_OUTCOME_ALREADY_APPLIED
                                              : v1::APPEND_OUTCOME_APPLIED);
   }
-  ack->set_durability(EncodeDurability(registry_.store().durability()));
+  ack->set_durability(EncodeDurability(parts_.store.durability()));
   ack->set_hull_revision(result->hull_revision);
   ack->set_vertex_count(result->vertex_count);
   AddTo(ack->mutable_counts(), result->counts);

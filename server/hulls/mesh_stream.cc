@@ -22,7 +22,7 @@ constexpr int kIndicesPerMessage = Config::kReplyMessageBytes / 5;
 }  // namespace
 
 void MeshStream::Open() {
-  RunOn(readers_, [this] {
+  RunOn(parts_.long_readers, [this] {
     const absl::Status made = MakeHeader();
     if (call().ShouldStop()) return FinishCall(call().StopStatus());
     if (!made.ok()) return FinishCall(made);
@@ -34,20 +34,19 @@ absl::Status MeshStream::MakeHeader() {
   absl::Status valid = CheckHullId(call().caller(), request().hull_id(), "hull_id");
   if (!valid.ok()) return valid;
   const auto should_stop = [this] { return call().ShouldStop(); };
-  HULLD_ASSIGN_OR_RETURN(
-      const Freshness freshness,
-      DecodeFreshness(request().freshness(), registry_.store(), call().arrival()));
+  HULLD_ASSIGN_OR_RETURN(const Freshness freshness,
+                         DecodeFreshness(request().freshness(), parts_.store, call().arrival()));
   HULLD_ASSIGN_OR_RETURN(const auto resolved,
-                         registry_.Resolve(request().hull_id(), should_stop, freshness));
+                         parts_.registry.Resolve(request().hull_id(), should_stop, freshness));
   HULLD_ASSIGN_OR_RETURN(const Hull* hull,
-                         registry_.reader().Canonical(resolved.second, should_stop));
+                         parts_.registry.reader().Canonical(resolved.second, should_stop));
   mesh_ = std::shared_ptr<const Hull>(resolved.second.served, hull);
   v1::MeshHeader* header = reply().mutable_header();
   if (request().has_simplification()) {
     const absl::Status simplified = Simplify(request().simplification(), header);
     if (!simplified.ok()) return Prefixed("simplification: ", simplified);
   }
-  EncodeHeader(registry_.store(), resolved.first, header->mutable_header());
+  EncodeHeader(parts_.store, resolved.first, header->mutable_header());
   EncodeRecord(resolved.second.record, header->mutable_hull());
   header->set_facet_count(mesh_->facet_count());
   header->set_vertex_count(mesh_->vertices().size());

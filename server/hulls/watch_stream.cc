@@ -60,17 +60,18 @@ void WatchStream::Open() {
   if (!target.ok()) return FinishCall(target.status());
   const absl::StatusOr<WatchPosition> position = ReadPosition();
   if (!position.ok()) return FinishCall(position.status());
-  RunOn(readers_, [this, target = *target, position = *position] { Begin(target, position); });
+  RunOn(parts_.readers,
+        [this, target = *target, position = *position] { Begin(target, position); });
 }
 
 // The watch includes all changes that this server or a peer server acknowledged before the call.
 void WatchStream::Begin(const WatchTarget& target, const WatchPosition& position) {
   const auto should_stop = [this] { return call().ShouldStop(); };
-  const absl::Status fresh = registry_.barrier().AwaitPeers(should_stop);
+  const absl::Status fresh = parts_.registry.barrier().AwaitPeers(should_stop);
   if (call().ShouldStop()) return FinishCall(call().StopStatus());
   if (!fresh.ok()) return FinishCall(fresh);
-  absl::StatusOr<std::shared_ptr<Watch>> watch =
-      registry_.feed().Open(target, position, [this, self = shared_from_this()] { SendNext(); });
+  absl::StatusOr<std::shared_ptr<Watch>> watch = parts_.registry.feed().Open(
+      target, position, [this, self = shared_from_this()] { SendNext(); });
   if (!watch.ok()) return FinishCall(watch.status());
   {
     const std::lock_guard lock(watch_mutex_);
@@ -105,7 +106,7 @@ absl::StatusOr<WatchPosition> WatchStream::ReadPosition() const {
 void WatchStream::SendNext() {
   while (true) {
     if (call().ShouldStop()) return FinishCall(call().StopStatus());
-    absl::StatusOr<WatchBatch> batch = registry_.feed().Next(watch_);
+    absl::StatusOr<WatchBatch> batch = parts_.registry.feed().Next(watch_);
     if (!batch.ok()) return FinishCall(batch.status());
     // on_ready may already run on another thread.
     if (batch->waits) return;
@@ -113,7 +114,7 @@ void WatchStream::SendNext() {
     const bool is_mark = batch->revision > sent_revision_;
     if (batch->changes.empty() && !batch->synced && !batch->restarted && !is_mark) continue;
     if (!std::ranges::any_of(batch->changes, WantsBox)) return SendBatch(*batch);
-    return RunOn(readers_, [this, loaded = *std::move(batch)]() mutable {
+    return RunOn(parts_.readers, [this, loaded = *std::move(batch)]() mutable {
       const absl::Status status = LoadBoxes(&loaded);
       if (!status.ok()) return FinishCall(OrStopped(status));
       SendBatch(loaded);
@@ -128,7 +129,7 @@ absl::Status WatchStream::LoadBoxes(WatchBatch* batch) {
   loaded.reserve(batch->changes.size());
   for (HullChange& change : batch->changes) {
     if (WantsBox(change)) {
-      const auto resolved = registry_.Resolve(
+      const auto resolved = parts_.registry.Resolve(
           change.record.hull_id, [this] { return call().ShouldStop(); }, Freshness::AnyStaleness());
       const absl::Status& status = resolved.status();
       if (absl::IsNotFound(status)) continue;
@@ -148,7 +149,7 @@ absl::Status WatchStream::LoadBoxes(WatchBatch* batch) {
 
 void WatchStream::SendBatch(const WatchBatch& batch) {
   sent_revision_ = batch.revision;
-  EncodeHeader(registry_.store(), batch.revision, reply().mutable_header());
+  EncodeHeader(parts_.store, batch.revision, reply().mutable_header());
   reply().set_synced(batch.synced);
   reply().set_restarted(batch.restarted);
   for (const HullChange& change : batch.changes) EncodeEvent(change, reply().add_events());
@@ -158,7 +159,7 @@ void WatchStream::SendBatch(const WatchBatch& batch) {
 void WatchStream::OnSent() {
   reply().Clear();
   if (is_synced_) return SendNext();
-  RunOn(readers_, [this] { SendNext(); });
+  RunOn(parts_.readers, [this] { SendNext(); });
 }
 
 void WatchStream::OnCancel() {
@@ -172,7 +173,7 @@ void WatchStream::Nudge() {
     const std::lock_guard lock(watch_mutex_);
     watch = watch_;
   }
-  if (watch != nullptr) registry_.feed().Nudge(watch);
+  if (watch != nullptr) parts_.registry.feed().Nudge(watch);
 }
 
 void WatchStream::OnDone() {
@@ -183,7 +184,7 @@ void WatchStream::OnDone() {
     const std::lock_guard lock(watch_mutex_);
     watch = std::exchange(watch_, nullptr);
   }
-  if (watch != nullptr) registry_.feed().Close(watch);
+  if (watch != nullptr) parts_.registry.feed().Close(watch);
 }
 
 }  // namespace hulld::server

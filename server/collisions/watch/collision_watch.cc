@@ -154,7 +154,7 @@ absl::Status CollisionWatch::HandleOpen(v1::CollisionWatchOpen& open) {
                   table_.LookupFor(options_, {kExpectedRounds * per_hull, true}), should_stop);
   if (!round.ok()) return round.status();
   Locked([this] { has_changes_ = true; });
-  table_.SetHulls(parts_.registry.store(), std::move(round->resolved), options_);
+  table_.SetHulls(parts_.store, std::move(round->resolved), options_);
   revision_ = round->revision;
   new_piece_hulls_ = std::move(round->piece_hulls);
   for (const size_t k : round->places) {
@@ -256,7 +256,7 @@ void CollisionWatch::SendRound() {
     new_problems_.clear();
     if (answers_message_) call().EndMessage();
   }
-  EncodeHeader(parts_.registry.store(), revision_, reply_.mutable_header());
+  EncodeHeader(parts_.store, revision_, reply_.mutable_header());
   reply_.set_update(messages_);
   reply_.set_synced(is_complete);
   Locked([&] {
@@ -281,7 +281,7 @@ bool CollisionWatch::AddHulls() {
     } else if (next_piece_hull_ < new_piece_hulls_.size()) {
       v1::HullVersion* const version = reply_.add_piece_hulls();
       const HullRecord& hull = new_piece_hulls_[next_piece_hull_++];
-      EncodeVersion(parts_.registry.store(), hull, version);
+      EncodeVersion(parts_.store, hull, version);
       reply_bytes_ += kEntryHeaderBytes + version->ByteSizeLong();
     } else {
       v1::PlacementProblem* const problem = reply_.add_placement_problems();
