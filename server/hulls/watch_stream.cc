@@ -1,9 +1,9 @@
 #include "server/hulls/watch_stream.h"
 
 #include <algorithm>
+#include <array>
 #include <utility>
 
-#include "core/base/check.h"
 #include "core/base/status_macros.h"
 #include "server/wire/encode.h"
 
@@ -15,20 +15,12 @@ bool WantsBox(const HullChange& change) {
   return change.record.vertex_count > 0 && change.box.IsEmpty() && !change.damaged;
 }
 
+// The array is in the order of ChangeKind.
 v1::HullEventKind EncodeKind(ChangeKind kind) {
-  switch (kind) {
-    case ChangeKind::kPresent:
-      return v1::HULL_EVENT_KIND_PRESENT;
-    case ChangeKind::kCreated:
-      return v1::HULL_EVENT_KIND_CREATED;
-    case ChangeKind::kChanged:
-      return v1::HULL_EVENT_KIND_CHANGED;
-    case ChangeKind::kReplaced:
-      return v1::HULL_EVENT_KIND_REPLACED;
-    case ChangeKind::kDeleted:
-      return v1::HULL_EVENT_KIND_DELETED;
-  }
-  HULLD_UNREACHABLE();
+  static constexpr std::array kKinds = {v1::HULL_EVENT_KIND_PRESENT, v1::HULL_EVENT_KIND_CREATED,
+                                        v1::HULL_EVENT_KIND_CHANGED, v1::HULL_EVENT_KIND_REPLACED,
+                                        v1::HULL_EVENT_KIND_DELETED};
+  return kKinds[static_cast<size_t>(kind)];
 }
 
 void EncodeEvent(const HullChange& change, v1::HullEvent* event) {
