@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "core/base/status_macros.h"
-#include "server/access/authenticator.h"
+#include "server/access/guard.h"
 #include "server/call/error_details.h"
 #include "server/call/request_id.h"
 #include "server/contract/limit_error.h"
@@ -53,18 +53,17 @@ absl::Status Call::Begin(std::function<void()> on_revoked) {
     const grpc::string_ref text = metadata.find(kTraceKey)->second;
     trace_ = TraceContext::Parse({text.data(), text.size()});
   }
-  const Authenticator* const authenticator = admission_.authenticator();
-  const uint64_t generation = authenticator == nullptr ? 0 : authenticator->generation();
-  HULLD_RETURN_IF_ERROR(Authenticate());
-
+  const Guard* const guard = admission_.guard();
+  if (guard != nullptr && PermissionFor(rpc_) != Permission::kNone) {
+    HULLD_ASSIGN_OR_RETURN(caller_, guard->Authenticate(metadata, rpc_));
+  }
   const std::optional<PeerAddress> peer = PeerAddress::FromGrpc(peer_);
   HULLD_ASSIGN_OR_RETURN(Admission::Ticket ticket,
                          admission_.Admit({rpc_, Client(peer), peer, context_.c_call(), caller_,
                                            &lifetime_, std::move(on_revoked)}));
   ticket_.emplace(std::move(ticket));
   // The tokens may have changed before the call was registered as running.
-  if (authenticator != nullptr && authenticator->generation() != generation &&
-      !caller_.name.empty() && !authenticator->Knows(caller_)) {
+  if (!caller_.name.empty() && !guard->Knows(caller_)) {
     lifetime_.Revoke();
     return lifetime_.StopStatus();
   }
@@ -76,15 +75,6 @@ const std::string& Call::request_id() const {
   std::call_once(request_id_made_, [this] { request_id_ = NextRequestId(); });
   request_id_exposed_ = true;
   return request_id_;
-}
-
-absl::Status Call::Authenticate() {
-  if (admission_.authenticator() == nullptr || PermissionFor(rpc_) == Permission::kNone) {
-    return absl::OkStatus();
-  }
-  HULLD_ASSIGN_OR_RETURN(
-      caller_, admission_.authenticator()->Authenticate(context_.client_metadata(), rpc_));
-  return absl::OkStatus();
 }
 
 std::string Call::Client(const std::optional<PeerAddress>& peer) const {

@@ -157,7 +157,8 @@ class StreamBases : public ::testing::Test, public Collisions, public Hulls {
   }
 
   Metrics metrics_;
-  Admission admission_{Limits(), metrics_};
+  ConnectionTable connections_{1, 1};
+  Admission admission_{Limits(), metrics_, connections_};
   TestQueue::Script script_;
   std::shared_ptr<Signal> gone_ = std::make_shared<Signal>();
   size_t count_ = 0;
