@@ -1,28 +1,50 @@
 #include "server/call/call.h"
 
+#include <absl/strings/ascii.h>
 #include <absl/strings/str_cat.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <iterator>
+#include <string_view>
 #include <utility>
 
 #include "core/base/status_macros.h"
 #include "server/access/guard.h"
 #include "server/call/error_details.h"
-#include "server/call/request_id.h"
 #include "server/contract/limit_error.h"
 #include "server/contract/status_map.h"
+#include "server/process/random_id.h"
 
 namespace hulld::server {
 namespace {
 
 constexpr char kRequestIdKey[] = "x-request-id";
+constexpr size_t kMaxRequestIdCharacters = 128;
 constexpr char kTraceKey[] = "traceparent";
 // Also honored by gRPC's own retries.
 constexpr char kRetryKey[] = "grpc-retry-pushback-ms";
 
 double Milliseconds(std::chrono::steady_clock::duration duration) {
   return std::chrono::duration<double, std::milli>(duration).count();
+}
+
+// Returns true if `text` is a valid request ID: 1 to 128 letters, digits or -_.:/+=, safe in logs
+// and metadata without escaping.
+bool IsRequestId(const std::string& text) {
+  return !text.empty() && text.size() <= kMaxRequestIdCharacters &&
+         std::ranges::all_of(text, [](char c) {
+           return absl::ascii_isalnum(static_cast<unsigned char>(c)) ||
+                  std::string_view("-_.:/+=").find(c) != std::string_view::npos;
+         });
+}
+
+// Returns a unique request ID: a random part for the process, with 64 bits, followed by a counter.
+// Cost: ~100 ns.
+std::string NextRequestId() {
+  static const std::string kProcess = RandomId().substr(0, 16);
+  static std::atomic<uint64_t> last = 0;
+  return absl::StrCat(kProcess, "-", last.fetch_add(1, std::memory_order_relaxed) + 1);
 }
 
 // Returns true if --max-request-time limits each message of the client rather than the call.
