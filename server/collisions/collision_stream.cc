@@ -120,9 +120,8 @@ absl::Status CollisionStream::OfMessage(const absl::Status& status) const {
 }
 
 absl::Status CollisionStream::HandleMessage() {
-  const absl::Status in_order = CheckOrder(
-      request(), open_, "open was sent twice; start a new stream for other placements or pairs");
-  if (!in_order.ok()) return in_order;
+  HULLD_RETURN_IF_ERROR(CheckOrder(
+      request(), open_, "open was sent twice; start a new stream for other placements or pairs"));
   if (request().has_open()) return Prefixed("open: ", HandleOpen());
   ++messages_;
   return OfMessage(HandleUpdate(request().update()));
@@ -135,16 +134,13 @@ absl::Status CollisionStream::HandleOpen() {
                                           parts_.registry.limits(), call().lifetime()));
   HULLD_ASSIGN_OR_RETURN(freshness_,
                          DecodeFreshness(open.freshness(), parts_.store, call().message_arrival()));
-  const absl::Status resting =
-      RefuseMotions(open.placements(), open.packed_placements(), "a stream");
-  if (!resting.ok()) return resting;
+  HULLD_RETURN_IF_ERROR(RefuseMotions(open.placements(), open.packed_placements(), "a stream"));
   HULLD_ASSIGN_OR_RETURN(
       PlacementTable table,
       PlacementTable::Make(open.placements(), *open.mutable_packed_placements(), call().caller(),
                            parts_.registry.limits().max_placements, "the stream"));
-  const absl::Status valid = ValidatePairs(
-      open.pairs(), table.size(), parts_.registry.limits().max_pairs_per_batch, "the stream");
-  if (!valid.ok()) return valid;
+  HULLD_RETURN_IF_ERROR(ValidatePairs(open.pairs(), table.size(),
+                                      parts_.registry.limits().max_pairs_per_batch, "the stream"));
   options_ = std::move(options);
   wanted_ = open.wanted();
   only_changes_ = open.only_changes();

@@ -107,16 +107,15 @@ absl::Status HullService::Get(const v1::GetHullRequest& request, const Call& cal
   HULLD_RETURN_IF_ERROR(CheckHullId(call.caller(), request.hull_id(), "hull_id"));
   HULLD_ASSIGN_OR_RETURN(const Freshness freshness,
                          DecodeFreshness(request.freshness(), parts_.store, call.arrival()));
-  const auto resolved = parts_.registry.Resolve(
-      request.hull_id(), [&call] { return call.ShouldStop(); }, freshness);
-  if (!resolved.ok()) return resolved.status();
-  const auto& [as_of, view] = *resolved;
+  const auto should_stop = [&call] { return call.ShouldStop(); };
+  HULLD_ASSIGN_OR_RETURN(const auto resolved,
+                         parts_.registry.Resolve(request.hull_id(), should_stop, freshness));
+  const auto& [as_of, view] = resolved;
   EncodeHeader(parts_.store, as_of, response->mutable_header());
   EncodeRecord(view.record, response->mutable_hull());
   EncodeBox(*view.served, response);
   const bool wants_properties = request.properties() && !view.served->empty();
   if (request.without_facets() && !request.audit() && !wants_properties) return absl::OkStatus();
-  const auto should_stop = [&call] { return call.ShouldStop(); };
   HULLD_ASSIGN_OR_RETURN(const Hull* hull, parts_.registry.reader().Canonical(view, should_stop));
   if (!request.without_facets()) {
     response->set_edge_count(hull->edges().size());

@@ -31,8 +31,7 @@ void MeshStream::Open() {
 }
 
 absl::Status MeshStream::MakeHeader() {
-  absl::Status valid = CheckHullId(call().caller(), request().hull_id(), "hull_id");
-  if (!valid.ok()) return valid;
+  HULLD_RETURN_IF_ERROR(CheckHullId(call().caller(), request().hull_id(), "hull_id"));
   const auto should_stop = [this] { return call().ShouldStop(); };
   HULLD_ASSIGN_OR_RETURN(const Freshness freshness,
                          DecodeFreshness(request().freshness(), parts_.store, call().arrival()));

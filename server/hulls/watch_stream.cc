@@ -48,28 +48,29 @@ void EncodeEvent(const HullChange& change, v1::HullEvent* event) {
 }  // namespace
 
 void WatchStream::Open() {
-  const absl::StatusOr<WatchTarget> target = ReadTarget();
-  if (!target.ok()) return FinishCall(target.status());
-  const absl::StatusOr<WatchPosition> position = ReadPosition();
-  if (!position.ok()) return FinishCall(position.status());
-  RunOn(parts_.readers,
-        [this, target = *target, position = *position] { Begin(target, position); });
+  RunOn(parts_.readers, [this] {
+    const absl::Status begun = Begin();
+    begun.ok() ? SendNext() : FinishCall(OrStopped(begun));
+  });
 }
 
-// The watch includes all changes that this server or a peer server acknowledged before the call.
-void WatchStream::Begin(const WatchTarget& target, const WatchPosition& position) {
-  const auto should_stop = [this] { return call().ShouldStop(); };
-  const absl::Status fresh = parts_.registry.barrier().AwaitPeers(should_stop);
-  if (call().ShouldStop()) return FinishCall(call().StopStatus());
-  if (!fresh.ok()) return FinishCall(fresh);
-  absl::StatusOr<std::shared_ptr<Watch>> watch = parts_.registry.feed().Open(
-      target, position, [this, self = shared_from_this()] { SendNext(); });
-  if (!watch.ok()) return FinishCall(watch.status());
-  {
-    const std::lock_guard lock(watch_mutex_);
-    watch_ = *std::move(watch);
+// Opens the watch. It includes all changes that this server or a peer server acknowledged before
+// the call.
+absl::Status WatchStream::Begin() {
+  HULLD_ASSIGN_OR_RETURN(const WatchTarget target, ReadTarget());
+  if (request().after_revision() > 0 && request().store_id().empty()) {
+    return absl::InvalidArgumentError(
+        "after_revision requires store_id; use the one from the same header");
   }
-  SendNext();
+  HULLD_RETURN_IF_ERROR(
+      parts_.registry.barrier().AwaitPeers([this] { return call().ShouldStop(); }));
+  HULLD_ASSIGN_OR_RETURN(
+      std::shared_ptr<Watch> watch,
+      parts_.registry.feed().Open(target, {request().after_revision(), request().store_id()},
+                                  [this, self = shared_from_this()] { SendNext(); }));
+  const std::lock_guard lock(watch_mutex_);
+  watch_ = std::move(watch);
+  return absl::OkStatus();
 }
 
 absl::StatusOr<WatchTarget> WatchStream::ReadTarget() const {
@@ -80,17 +81,8 @@ absl::StatusOr<WatchTarget> WatchStream::ReadTarget() const {
   if (!request().prefix().empty()) {
     return absl::InvalidArgumentError("prefix and hull_id are both set; set one of them");
   }
-  const absl::Status valid = CheckHullId(call().caller(), request().hull_id(), "hull_id");
-  if (!valid.ok()) return valid;
+  HULLD_RETURN_IF_ERROR(CheckHullId(call().caller(), request().hull_id(), "hull_id"));
   return WatchTarget{"", {request().hull_id()}, request().bodies()};
-}
-
-absl::StatusOr<WatchPosition> WatchStream::ReadPosition() const {
-  if (request().after_revision() > 0 && request().store_id().empty()) {
-    return absl::InvalidArgumentError(
-        "after_revision requires store_id; use the one from the same header");
-  }
-  return WatchPosition{request().after_revision(), request().store_id()};
 }
 
 // Sends the next batch, or waits for on_ready, which calls this function again. At most one such

@@ -31,9 +31,8 @@ class WatchStream : public RequestStream<PulledStream<WriteReactor, v1::WatchHul
   void OnRevoked() override { Nudge(); }
   void OnDone() override;
 
-  void Begin(const WatchTarget& target, const WatchPosition& position);
+  absl::Status Begin();
   absl::StatusOr<WatchTarget> ReadTarget() const;
-  absl::StatusOr<WatchPosition> ReadPosition() const;
   void SendNext();
   absl::Status LoadBoxes(WatchBatch* batch);
   void SendBatch(const WatchBatch& batch);

@@ -102,9 +102,8 @@ void CollisionWatch::TakeMessage() {
 }
 
 absl::Status CollisionWatch::HandleMessage() {
-  const absl::Status in_order = CheckOrder(
-      request(), is_open_, "open was sent twice; start a new watch for other placements or pairs");
-  if (!in_order.ok()) return in_order;
+  HULLD_RETURN_IF_ERROR(CheckOrder(
+      request(), is_open_, "open was sent twice; start a new watch for other placements or pairs"));
   if (request().has_open()) return Prefixed("open: ", HandleOpen(*request().mutable_open()));
   ++messages_;
   return Prefixed(absl::StrCat("update ", messages_, ": "), HandleUpdate(request().update()));
@@ -121,9 +120,7 @@ absl::Status CollisionWatch::HandleOpen(v1::CollisionWatchOpen& open) {
   const Limits& limits = parts_.registry.limits();
   HULLD_ASSIGN_OR_RETURN(QueryOptions options, MakeQueryOptions(v1::METHOD_UNSPECIFIED, wanted, 0,
                                                                 limits, call().lifetime()));
-  const absl::Status resting =
-      RefuseMotions(open.placements(), open.packed_placements(), "a watch");
-  if (!resting.ok()) return resting;
+  HULLD_RETURN_IF_ERROR(RefuseMotions(open.placements(), open.packed_placements(), "a watch"));
   HULLD_ASSIGN_OR_RETURN(PlacementTable table,
                          PlacementTable::Make(open.placements(), *open.mutable_packed_placements(),
                                               call().caller(), limits.max_placements, "the watch"));
@@ -133,10 +130,9 @@ absl::Status CollisionWatch::HandleOpen(v1::CollisionWatchOpen& open) {
     return absl::InvalidArgumentError(
         "pairs cannot be combined with groups or movers; list the pairs, or filter all pairs");
   }
-  absl::Status valid =
-      ValidatePairs(open.pairs(), table.size(), limits.max_pairs_per_batch, "the watch");
-  if (valid.ok()) valid = ValidateGroups(open, table.size());
-  if (!valid.ok()) return valid;
+  HULLD_RETURN_IF_ERROR(
+      ValidatePairs(open.pairs(), table.size(), limits.max_pairs_per_batch, "the watch"));
+  HULLD_RETURN_IF_ERROR(ValidateGroups(open, table.size()));
   options_ = std::move(options);
   table_ = std::move(table);
   table_.SortByHull();
@@ -149,15 +145,15 @@ absl::Status CollisionWatch::HandleOpen(v1::CollisionWatchOpen& open) {
     Locked([this] { has_changes_ = true; });
   };
   const auto should_stop = [this] { return call().ShouldStop(); };
-  absl::StatusOr<WatchedHulls::Round> round =
+  HULLD_ASSIGN_OR_RETURN(
+      WatchedHulls::Round round,
       hulls_.Open(table_.hull_ids(), on_ready,
-                  table_.LookupFor(options_, {kExpectedRounds * per_hull, true}), should_stop);
-  if (!round.ok()) return round.status();
+                  table_.LookupFor(options_, {kExpectedRounds * per_hull, true}), should_stop));
   Locked([this] { has_changes_ = true; });
-  table_.SetHulls(parts_.store, std::move(round->resolved), options_);
-  revision_ = round->revision;
-  new_piece_hulls_ = std::move(round->piece_hulls);
-  for (const size_t k : round->places) {
+  table_.SetHulls(parts_.store, std::move(round.resolved), options_);
+  revision_ = round.revision;
+  new_piece_hulls_ = std::move(round.piece_hulls);
+  for (const size_t k : round.places) {
     if (table_.hull(k).ok()) new_hulls_.push_back(k);
   }
   std::vector<uint32_t> all(table_.size());
