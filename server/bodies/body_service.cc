@@ -89,14 +89,14 @@ void EncodePose(const Pose& pose, v1::Pose* message) {
 }  // namespace
 
 UnaryReactor* BodyService::PutBody(CallContext* context, const Bytes* request, Bytes* response) {
-  return PutCall::Start(*context, parts_.admission, Rpc::kPutBody, {request, response},
+  return PutCall::Start(context, parts_.admission, Rpc::kPutBody, request, response,
                         [this](PutCall* call) {
                           parts_.readers.Submit([this, call] { Put(call); }, call->call().client());
                         });
 }
 
 UnaryReactor* BodyService::GetBody(CallContext* context, const Bytes* request, Bytes* response) {
-  return GetCall::Start(*context, parts_.admission, Rpc::kGetBody, {request, response},
+  return GetCall::Start(context, parts_.admission, Rpc::kGetBody, request, response,
                         [this](GetCall* call) {
                           const auto get = [this, call](std::chrono::nanoseconds staleness) {
                             return Get(call->request(), call->call(), staleness, &call->response());
@@ -106,7 +106,7 @@ UnaryReactor* BodyService::GetBody(CallContext* context, const Bytes* request, B
 }
 
 UnaryReactor* BodyService::ListBodies(CallContext* context, const Bytes* request, Bytes* response) {
-  return ListCall::Start(*context, parts_.admission, Rpc::kListBodies, {request, response},
+  return ListCall::Start(context, parts_.admission, Rpc::kListBodies, request, response,
                          [this](ListCall* call) {
                            EndListed(parts_.registry, parts_.readers, call, Rpc::kListBodies,
                                      {.bodies = true}, AddListed);
@@ -114,7 +114,7 @@ UnaryReactor* BodyService::ListBodies(CallContext* context, const Bytes* request
 }
 
 UnaryReactor* BodyService::DeleteBody(CallContext* context, const Bytes* request, Bytes* response) {
-  return DeleteCall::Start(*context, parts_.admission, Rpc::kDeleteBody, {request, response},
+  return DeleteCall::Start(context, parts_.admission, Rpc::kDeleteBody, request, response,
                            [this](DeleteCall* call) {
                              EndDeleted(parts_.registry, call, parts_.registry.bodies(), "body",
                                         call->request().body_id());

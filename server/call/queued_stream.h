@@ -4,13 +4,11 @@
 #include <absl/status/status.h>
 #include <grpcpp/grpcpp.h>
 
-#include <atomic>
 #include <chrono>
 #include <cstddef>
 #include <deque>
 #include <mutex>
 #include <optional>
-#include <thread>
 #include <utility>
 
 #include "server/call/call_stream.h"
@@ -33,10 +31,8 @@ class QueuedStream : public CallStream<Reactor> {
   void Locked(Step&& step) {
     const auto self = this->shared_from_this();
     const std::lock_guard lock(mutex_);
-    holder_ = std::this_thread::get_id();
     step();
     Proceed();
-    holder_ = std::thread::id();
   }
 
   template <typename Step>
@@ -44,7 +40,9 @@ class QueuedStream : public CallStream<Reactor> {
     Locked(std::forward<Step>(step));
   }
 
-  static constexpr bool kIsLocked = true;
+  void Open() override {
+    Locked([] {});
+  }
   void OnRevoked() override {
     Locked([this] { Abandon(); });
   }
@@ -53,16 +51,15 @@ class QueuedStream : public CallStream<Reactor> {
 
   // Starts work (reads or tasks) as the state permits. Called after each Locked step until an end
   // is set. May queue replies and set the end.
-  virtual void StartWork() = 0;
+  virtual void StartWork() {}
   // Returns true if work is in flight that must finish before the stream ends.
-  virtual bool IsWorking() const = 0;
+  virtual bool IsWorking() const { return false; }
   // Returns true if the only queued reply must wait to be merged with later ones, which saves
   // writes. In that case, a Locked step must follow soon.
   virtual bool KeepsWaiting() const { return false; }
 
   // Queues a reply. bytes: its size, if the stream bounds its queue.
   void Queue(Reply reply, size_t bytes = 0) {
-    CheckLocked();
     unsent_bytes_ += bytes;
     waiting_.push_back({std::move(reply), bytes, std::chrono::steady_clock::now()});
   }
@@ -80,7 +77,6 @@ class QueuedStream : public CallStream<Reactor> {
     return std::chrono::steady_clock::now() - waiting_.back().since;
   }
   void DropWaiting() {
-    CheckLocked();
     for (const Waiting& dropped : waiting_) unsent_bytes_ -= dropped.bytes;
     waiting_.clear();
   }
@@ -89,14 +85,10 @@ class QueuedStream : public CallStream<Reactor> {
 
   // Sets the end unless one is set.
   void End(const absl::Status& status) {
-    CheckLocked();
     if (!end_.has_value()) end_ = status;
   }
   // Replaces the end with a more specific one.
-  void OverrideEnd(const absl::Status& status) {
-    CheckLocked();
-    end_ = status;
-  }
+  void OverrideEnd(const absl::Status& status) { end_ = status; }
   const std::optional<absl::Status>& end() const { return end_; }
 
  private:
@@ -105,8 +97,6 @@ class QueuedStream : public CallStream<Reactor> {
     size_t bytes;
     std::chrono::steady_clock::time_point since;
   };
-
-  void CheckLocked() const { HULLD_DCHECK(holder_ == std::this_thread::get_id()); }
 
   void OnWriteDone(bool ok) final {
     Locked([this, ok] {
@@ -143,7 +133,6 @@ class QueuedStream : public CallStream<Reactor> {
   }
 
   std::mutex mutex_;
-  std::atomic<std::thread::id> holder_ = std::thread::id();
   // The mutex guards the members below.
   std::deque<Waiting> waiting_;
   // The serialized reply in flight, and the size with which it was queued.

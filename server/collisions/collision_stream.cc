@@ -129,23 +129,20 @@ absl::Status CollisionStream::HandleMessage() {
 
 absl::Status CollisionStream::HandleOpen() {
   v1::CollisionStreamOpen& open = *request().mutable_open();
-  HULLD_ASSIGN_OR_RETURN(QueryOptions options,
+  HULLD_ASSIGN_OR_RETURN(options_,
                          MakeQueryOptions(v1::METHOD_UNSPECIFIED, open.wanted(), open.tolerance(),
                                           parts_.registry.limits(), call().lifetime()));
   HULLD_ASSIGN_OR_RETURN(freshness_,
                          DecodeFreshness(open.freshness(), parts_.store, call().message_arrival()));
   HULLD_RETURN_IF_ERROR(RefuseMotions(open.placements(), open.packed_placements(), "a stream"));
   HULLD_ASSIGN_OR_RETURN(
-      PlacementTable table,
+      table_,
       PlacementTable::Make(open.placements(), *open.mutable_packed_placements(), call().caller(),
                            parts_.registry.limits().max_placements, "the stream"));
-  HULLD_RETURN_IF_ERROR(ValidatePairs(open.pairs(), table.size(),
+  HULLD_RETURN_IF_ERROR(ValidatePairs(open.pairs(), table_.size(),
                                       parts_.registry.limits().max_pairs_per_batch, "the stream"));
-  options_ = std::move(options);
   wanted_ = open.wanted();
   only_changes_ = open.only_changes();
-  table_ = std::move(table);
-
   HULLD_RETURN_IF_ERROR(ChargeFor(static_cast<size_t>(open.pairs_size()) / 2));
   pairs_ = LivePairs(open.pairs(), table_.size(), v1::RELATION_UNSPECIFIED);
   open_ = true;

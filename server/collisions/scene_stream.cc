@@ -64,35 +64,29 @@ absl::Status SceneStream::Validate() {
 }
 
 absl::Status SceneStream::ValidateChoice() const {
-  if (request().first_only() && request().has_limit()) {
-    return absl::InvalidArgumentError("first_only and limit cannot be combined; omit one of them");
+  const bool has_limit = request().has_limit();
+  const bool moves = table_.has_motions();
+  const v1::Wanted& wanted = request().wanted();
+  const std::pair<bool, const char*> errors[] = {
+      {request().first_only() && has_limit,
+       "first_only and limit cannot be combined; omit one of them"},
+      {request().first_only() && !moves,
+       "first_only orders pairs by their first contact, but no placement has an end_pose; set one, "
+       "or omit first_only"},
+      {request().every_piece() && has_limit,
+       "every_piece and limit cannot be combined; omit one of them"},
+      {request().every_piece() && moves,
+       "every_piece and end_pose cannot be combined; omit one of them, or query the pairs of "
+       "pieces"},
+      {has_limit && request().limit() == 0, "limit is 0; set it to at least 1, or omit it"},
+      {has_limit && !(wanted.separation() && wanted.has_clearance()),
+       "limit orders the pairs within a clearance by separation; set wanted.separation and "
+       "wanted.clearance, which may be infinite"},
+  };
+  for (const auto& [is_wrong, message] : errors) {
+    if (is_wrong) return absl::InvalidArgumentError(message);
   }
-  if (request().first_only() && !table_.has_motions()) {
-    return absl::InvalidArgumentError(
-        "first_only orders pairs by their first contact, but no placement has an end_pose; set "
-        "one, or omit first_only");
-  }
-  if (request().every_piece() && request().has_limit()) {
-    return absl::InvalidArgumentError("every_piece and limit cannot be combined; omit one of them");
-  }
-  if (request().every_piece() && table_.has_motions()) {
-    return absl::InvalidArgumentError(
-        "every_piece and end_pose cannot be combined; omit one of them, or query the pairs of "
-        "pieces");
-  }
-  return request().has_limit() ? ValidateLimit() : absl::OkStatus();
-}
-
-absl::Status SceneStream::ValidateLimit() const {
-  if (request().limit() == 0) {
-    return absl::InvalidArgumentError("limit is 0; set it to at least 1, or omit it");
-  }
-  if (request().wanted().separation() && request().wanted().has_clearance()) {
-    return absl::OkStatus();
-  }
-  return absl::InvalidArgumentError(
-      "limit orders the pairs within a clearance by separation; set wanted.separation and "
-      "wanted.clearance, which may be infinite");
+  return absl::OkStatus();
 }
 
 absl::Status SceneStream::Prepare() {

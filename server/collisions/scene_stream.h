@@ -73,7 +73,6 @@ class SceneStream
 
   // Called without the mutex.
   absl::Status ValidateChoice() const;
-  absl::Status ValidateLimit() const;
   // Answers the next ranked pair. CANCELLED.
   absl::Status AnswerRanked(ScenePiece& piece);
   // Starts to answer the pairs of pieces of a candidate.

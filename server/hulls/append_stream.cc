@@ -32,10 +32,6 @@ void AddTo(v1::PointCounts* sums, const PointCounts& counts) {
 
 }  // namespace
 
-void AppendStream::Open() {
-  Locked([] {});
-}
-
 void AppendStream::OnDone() {
   const auto self = shared_from_this();
   ReadingStream::OnDone();

@@ -33,7 +33,6 @@ class AppendStream : public ReadingStream<QueuedStream<BidiReactor, v1::AppendPo
     absl::StatusOr<ChunkResult> result;
   };
 
-  void Open() override;
   void OnDone() override;
 
   // The members below require the mutex.

@@ -34,7 +34,7 @@ void AddListed(const HullChange& hull, v1::ListHullsResponse& response) {
 }  // namespace
 
 UnaryReactor* HullService::CreateHull(CallContext* context, const Bytes* request, Bytes* response) {
-  return CreateCall::Start(*context, parts_.admission, Rpc::kCreateHull, {request, response},
+  return CreateCall::Start(context, parts_.admission, Rpc::kCreateHull, request, response,
                            [this](CreateCall* call) { Create(call); });
 }
 
@@ -48,7 +48,7 @@ ReadReactor* HullService::ReplaceHull(CallContext* context, Bytes* response) {
 
 UnaryReactor* HullService::GetHull(CallContext* context, const Bytes* request, Bytes* response) {
   return GetCall::Start(
-      *context, parts_.admission, Rpc::kGetHull, {request, response}, [this](GetCall* call) {
+      context, parts_.admission, Rpc::kGetHull, request, response, [this](GetCall* call) {
         // The cost of an audit, or of sums over the surface, increases with the hull's size.
         const bool is_long = call->request().audit() || call->request().properties();
         TaskPool& readers = is_long ? parts_.long_readers : parts_.readers;
@@ -62,7 +62,7 @@ WriteReactor* HullService::GetHullMesh(CallContext* context, const Bytes* reques
 }
 
 UnaryReactor* HullService::ListHulls(CallContext* context, const Bytes* request, Bytes* response) {
-  return ListCall::Start(*context, parts_.admission, Rpc::kListHulls, {request, response},
+  return ListCall::Start(context, parts_.admission, Rpc::kListHulls, request, response,
                          [this](ListCall* call) {
                            EndListed(parts_.registry, parts_.readers, call, Rpc::kListHulls,
                                      {.hulls = true}, AddListed);
@@ -70,7 +70,7 @@ UnaryReactor* HullService::ListHulls(CallContext* context, const Bytes* request,
 }
 
 UnaryReactor* HullService::DeleteHull(CallContext* context, const Bytes* request, Bytes* response) {
-  return DeleteCall::Start(*context, parts_.admission, Rpc::kDeleteHull, {request, response},
+  return DeleteCall::Start(context, parts_.admission, Rpc::kDeleteHull, request, response,
                            [this](DeleteCall* call) {
                              EndDeleted(parts_.registry, call, parts_.registry.hulls(), "hull",
                                         call->request().hull_id());

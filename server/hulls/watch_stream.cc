@@ -64,12 +64,9 @@ absl::Status WatchStream::Begin() {
   }
   HULLD_RETURN_IF_ERROR(
       parts_.registry.barrier().AwaitPeers([this] { return call().ShouldStop(); }));
-  HULLD_ASSIGN_OR_RETURN(
-      std::shared_ptr<Watch> watch,
-      parts_.registry.feed().Open(target, {request().after_revision(), request().store_id()},
-                                  [this, self = shared_from_this()] { SendNext(); }));
-  const std::lock_guard lock(watch_mutex_);
-  watch_ = std::move(watch);
+  HULLD_ASSIGN_OR_RETURN(watch_, parts_.registry.feed().Open(
+                                     target, {request().after_revision(), request().store_id()},
+                                     [this, self = shared_from_this()] { SendNext(); }));
   return absl::OkStatus();
 }
 
@@ -152,23 +149,13 @@ void WatchStream::OnCancel() {
 }
 
 void WatchStream::Nudge() {
-  std::shared_ptr<Watch> watch;
-  {
-    const std::lock_guard lock(watch_mutex_);
-    watch = watch_;
-  }
-  if (watch != nullptr) parts_.registry.feed().Nudge(watch);
+  if (const auto watch = watch_.load()) parts_.registry.feed().Nudge(watch);
 }
 
 void WatchStream::OnDone() {
   const auto self = shared_from_this();
   PulledStream::OnDone();
-  std::shared_ptr<Watch> watch;
-  {
-    const std::lock_guard lock(watch_mutex_);
-    watch = std::exchange(watch_, nullptr);
-  }
-  if (watch != nullptr) parts_.registry.feed().Close(watch);
+  if (const auto watch = watch_.exchange(nullptr)) parts_.registry.feed().Close(watch);
 }
 
 }  // namespace hulld::server

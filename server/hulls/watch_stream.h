@@ -5,9 +5,9 @@
 #include <absl/status/statusor.h>
 #include <grpcpp/grpcpp.h>
 
+#include <atomic>
 #include <cstdint>
 #include <memory>
-#include <mutex>
 
 #include "hulld/v1/hull.pb.h"
 #include "server/call/pulled_stream.h"
@@ -40,9 +40,8 @@ class WatchStream : public RequestStream<PulledStream<WriteReactor, v1::WatchHul
   void Nudge();
 
   const ServiceParts& parts_;
-  // Guards the assignment and reset of watch_ against threads that cancel.
-  std::mutex watch_mutex_;
-  std::shared_ptr<Watch> watch_;
+  // Read by threads that cancel.
+  std::atomic<std::shared_ptr<Watch>> watch_;
   // True after the existing hulls were sent.
   bool is_synced_ = false;
   // The revision of the last header.

@@ -491,25 +491,20 @@ std::string DefaultDataDir(const Environment& environment) {
 // Checks combinations of settings of the store.
 absl::Status CheckStore(const Config& config) {
   const bool is_postgres = config.store == "postgres";
-  if (is_postgres && config.postgres_conninfo_file.empty()) {
-    return absl::InvalidArgumentError(
-        "--store postgres requires --postgres-conninfo-file, a file with the connection string");
-  }
-  if (is_postgres && config.durability != "sync") {
-    return absl::InvalidArgumentError(
-        "--durability relaxed requires --store rocksdb; with --store postgres, configure the "
-        "database: ALTER ROLE ... SET synchronous_commit = off");
-  }
-  if (config.take_over && !is_postgres) {
-    return absl::InvalidArgumentError("--take-over requires --store postgres");
-  }
   const bool is_many = config.postgres_servers == "many";
-  if (is_many && !is_postgres) {
-    return absl::InvalidArgumentError("--postgres-servers many requires --store postgres");
-  }
-  if (is_many && config.take_over) {
-    return absl::InvalidArgumentError(
-        "--take-over requires --postgres-servers one; with many, no server is replaced");
+  const std::pair<bool, const char*> errors[] = {
+      {is_postgres && config.postgres_conninfo_file.empty(),
+       "--store postgres requires --postgres-conninfo-file, a file with the connection string"},
+      {is_postgres && config.durability != "sync",
+       "--durability relaxed requires --store rocksdb; with --store postgres, configure the "
+       "database: ALTER ROLE ... SET synchronous_commit = off"},
+      {config.take_over && !is_postgres, "--take-over requires --store postgres"},
+      {is_many && !is_postgres, "--postgres-servers many requires --store postgres"},
+      {is_many && config.take_over,
+       "--take-over requires --postgres-servers one; with many, no server is replaced"},
+  };
+  for (const auto& [is_wrong, message] : errors) {
+    if (is_wrong) return absl::InvalidArgumentError(message);
   }
   return absl::OkStatus();
 }

@@ -71,7 +71,7 @@ void CollisionWatch::StartWork() {
     if (is_short) return work(parts_.pool, &CollisionWatch::TakeMessage);
     return work(lane_, &CollisionWatch::TakeMessage);
   }
-  if (has_half_closed_) return End(absl::OkStatus());
+  if (has_half_closed_) return End(OrStopped(absl::OkStatus()));
   if (!std::exchange(has_changes_, false)) return;
   work(parts_.readers, &CollisionWatch::TakeChanges);
 }
@@ -118,10 +118,10 @@ absl::Status CollisionWatch::HandleOpen(v1::CollisionWatchOpen& open) {
   v1::Wanted wanted;
   if (open.has_clearance()) wanted.set_clearance(open.clearance());
   const Limits& limits = parts_.registry.limits();
-  HULLD_ASSIGN_OR_RETURN(QueryOptions options, MakeQueryOptions(v1::METHOD_UNSPECIFIED, wanted, 0,
-                                                                limits, call().lifetime()));
+  HULLD_ASSIGN_OR_RETURN(
+      options_, MakeQueryOptions(v1::METHOD_UNSPECIFIED, wanted, 0, limits, call().lifetime()));
   HULLD_RETURN_IF_ERROR(RefuseMotions(open.placements(), open.packed_placements(), "a watch"));
-  HULLD_ASSIGN_OR_RETURN(PlacementTable table,
+  HULLD_ASSIGN_OR_RETURN(table_,
                          PlacementTable::Make(open.placements(), *open.mutable_packed_placements(),
                                               call().caller(), limits.max_placements, "the watch"));
   const bool has_groups = open.groups_size() > 0 || open.ignored_group_pairs_size() > 0 ||
@@ -131,10 +131,8 @@ absl::Status CollisionWatch::HandleOpen(v1::CollisionWatchOpen& open) {
         "pairs cannot be combined with groups or movers; list the pairs, or filter all pairs");
   }
   HULLD_RETURN_IF_ERROR(
-      ValidatePairs(open.pairs(), table.size(), limits.max_pairs_per_batch, "the watch"));
-  HULLD_RETURN_IF_ERROR(ValidateGroups(open, table.size()));
-  options_ = std::move(options);
-  table_ = std::move(table);
+      ValidatePairs(open.pairs(), table_.size(), limits.max_pairs_per_batch, "the watch"));
+  HULLD_RETURN_IF_ERROR(ValidateGroups(open, table_.size()));
   table_.SortByHull();
   pairs_ = LivePairs(open, table_.size(), limits.max_pairs_per_batch);
   charge_.Set(table_.MemoryBytes() + pairs_.MemoryBytes());

@@ -38,9 +38,6 @@ class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchC
         charge_(parts.registry.memory(), MemoryUse::kReading) {}
 
  private:
-  void Open() override {
-    Locked([] {});
-  }
   void OnDone() override;
 
   // The functions below require the mutex.
