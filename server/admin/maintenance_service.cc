@@ -49,14 +49,11 @@ class BackupStream : public RequestStream<PulledStream<WriteReactor, v1::SaveBac
  private:
   void Open() override {
     if (absl::Status s = CheckSeesAll(call().caller()); !s.ok()) return FinishCall(s);
-    RunOn(parts_.long_readers, [this] {
-      if (absl::Status s = Begin(); !s.ok()) return FinishCall(s);
-      Send();
-    });
+    OnSent();
   }
 
   // Makes the copy, and the first message.
-  absl::Status Begin() {
+  absl::StatusOr<bool> Begin() {
     HULLD_ASSIGN_OR_RETURN(directory_, parts_.store.MakeCopy());
     std::error_code error;
     for (auto entry = std::filesystem::recursive_directory_iterator(directory_, error);
@@ -75,7 +72,7 @@ class BackupStream : public RequestStream<PulledStream<WriteReactor, v1::SaveBac
     EncodeHeader(parts_.store, parts_.registry.Sizes().store_revision, begin->mutable_header());
     begin->set_version(HULLD_VERSION);
     begin->set_store_format(kStoreFormat);
-    return absl::OkStatus();
+    return true;
   }
 
   // Runs on a reader thread, since it reads files.
@@ -94,6 +91,7 @@ class BackupStream : public RequestStream<PulledStream<WriteReactor, v1::SaveBac
   // Fills the reply with the next part. Returns false after the last one.
   absl::StatusOr<bool> NextMessage() {
     reply().Clear();
+    if (directory_.empty()) return Begin();
     if (!files_.empty()) return NextPiece();
     if (std::exchange(ended_, true)) return false;
     *reply().mutable_end() = totals_;

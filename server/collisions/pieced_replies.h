@@ -38,9 +38,8 @@ struct Piece {
   // The remaining range.
   uint64_t next = 0;
   uint64_t end = 0;
-  std::vector<Reply> replies = {};
-  // Size of each reply, and their total.
-  std::vector<size_t> reply_bytes = {};
+  // Replies with their sizes, and the total size.
+  std::vector<std::pair<Reply, size_t>> replies = {};
   size_t bytes = 0;
   // Rows of the next reply, and an upper estimate of their bytes.
   Reply rows = {};
@@ -62,8 +61,7 @@ struct Piece {
     if (row_bytes == 0) return;
     const size_t size = rows.ByteSizeLong();
     bytes += size;
-    reply_bytes.push_back(size);
-    replies.push_back(std::exchange(rows, {}));
+    replies.emplace_back(std::exchange(rows, {}), size);
     row_bytes = 0;
   }
 };
@@ -170,12 +168,11 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   virtual uint64_t CountUnits() = 0;
   // Queues the replies of the front piece, in order. Called one last time when the piece is done.
   virtual void Deliver(Work& piece) {
-    for (size_t i = 0; i < piece.replies.size(); ++i) {
-      QueueOrJoin(std::move(piece.replies[i]), piece.reply_bytes[i]);
+    for (auto& [reply, bytes] : piece.replies) {
+      QueueOrJoin(std::move(reply), bytes);
       holds_head_ = false;
     }
     piece.replies.clear();
-    piece.reply_bytes.clear();
     piece.bytes = 0;
   }
   // Called after all pieces are delivered. Returns the number of further units, which exist only
@@ -214,15 +211,11 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     return listed + this->request().packed_placements().hulls_size() <= shape_.max_short_placements;
   }
 
-  // Runs a short call on the pool first: if its hulls are ready, it need not wait for another
-  // thread.
+  // Opens the call without waiting if its hulls are ready: a short one on the pool, so that it need
+  // not wait for another thread.
   void Open() final {
-    if (IsShort()) return this->RunOn(lane_, [this] { OpenWith(Validate(), false); });
-    this->RunOn(parts_.long_readers, [this] {
-      absl::Status status = Validate();
-      if (status.ok()) status = Charge();
-      if (!status.ok() || !AwaitsFresh()) OpenWith(status, true);
-    });
+    const auto open = [this] { OpenWith(Validate(), false); };
+    IsShort() ? this->RunOn(lane_, open) : this->RunOn(parts_.long_readers, open);
   }
 
   // Returns true if the call waits for the store without occupying a thread. It is then opened

@@ -268,20 +268,18 @@ bool CollisionWatch::AddHulls() {
   while (next_hull_ < new_hulls_.size() || next_piece_hull_ < new_piece_hulls_.size() ||
          next_problem_ < new_problems_.size()) {
     if (reply_bytes_ >= Config::kReplyMessageBytes) return false;
+    const google::protobuf::Message* entry = nullptr;
     if (next_hull_ < new_hulls_.size()) {
-      v1::HullVersion* const version = reply_.add_hulls();
-      table_.EncodeHull(new_hulls_[next_hull_++], version);
-      reply_bytes_ += kEntryHeaderBytes + version->ByteSizeLong();
+      table_.EncodeHull(new_hulls_[next_hull_++], reply_.add_hulls());
+      entry = &*reply_.hulls().rbegin();
     } else if (next_piece_hull_ < new_piece_hulls_.size()) {
-      v1::HullVersion* const version = reply_.add_piece_hulls();
-      const HullRecord& hull = new_piece_hulls_[next_piece_hull_++];
-      EncodeVersion(parts_.store, hull, version);
-      reply_bytes_ += kEntryHeaderBytes + version->ByteSizeLong();
+      EncodeVersion(parts_.store, new_piece_hulls_[next_piece_hull_++], reply_.add_piece_hulls());
+      entry = &*reply_.piece_hulls().rbegin();
     } else {
-      v1::PlacementProblem* const problem = reply_.add_placement_problems();
-      table_.EncodeProblem(new_problems_[next_problem_++], problem);
-      reply_bytes_ += kEntryHeaderBytes + problem->ByteSizeLong();
+      table_.EncodeProblem(new_problems_[next_problem_++], reply_.add_placement_problems());
+      entry = &*reply_.placement_problems().rbegin();
     }
+    reply_bytes_ += kEntryHeaderBytes + entry->ByteSizeLong();
   }
   return true;
 }
