@@ -48,9 +48,6 @@ Admission::Admission(const Limits& limits, Metrics& metrics, ConnectionTable& co
       request_memory_(limits.request_memory) {
   metrics_.AddGauge("hulld_request_bytes", "Bytes held by requests in flight.",
                     [this] { return static_cast<double>(request_memory_.taken_bytes()); });
-  for (size_t i = 0; i < kRpcCount; ++i) {
-    running_gauges_[i] = &metrics_.RunningCalls(static_cast<Rpc>(i));
-  }
   watchman_ = std::thread([this] { CancelOverdue(); });
 }
 
@@ -152,7 +149,7 @@ absl::StatusOr<Admission::Ticket> Admission::Admit(const Arrival& arrival) {
           : &*clients_.emplace(arrival.client, Ticket::Client{.number = ++last_client_}).first;
   ticket.admission_ = this;
   Count(ticket, 1);
-  running_gauges_[static_cast<size_t>(arrival.rpc)]->Increment();
+  metrics_.RunningCalls(arrival.rpc).Increment();
   if (ticket.share_ == Ticket::Share::kCalls) {
     ticket.connection_ = connections_.BeginCall(arrival.peer);
   }
@@ -278,7 +275,7 @@ void Admission::Leave(Ticket& ticket) {
     }
     if (ticket.share_ == Ticket::Share::kFree) watching_health_.erase(ticket.connection_);
     if (ticket.client_->second.running == 0) clients_.erase(clients_.find(ticket.client_->first));
-    running_gauges_[static_cast<size_t>(ticket.rpc_)]->Decrement();
+    metrics_.RunningCalls(ticket.rpc_).Decrement();
     if (running_ == 0) idle_.notify_all();
   }
   if (watched != nullptr) grpc_call_unref(watched);

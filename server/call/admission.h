@@ -3,9 +3,7 @@
 
 #include <absl/status/statusor.h>
 #include <grpc/grpc.h>
-#include <prometheus/gauge.h>
 
-#include <array>
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
@@ -184,9 +182,6 @@ class Admission {
   const Guard* const guard_;
   RequestMemory request_memory_;
   std::function<size_t(Rpc)> backlog_;
-
-  // hulld_requests_running{rpc}.
-  std::array<prometheus::Gauge*, kRpcCount> running_gauges_;
 
   std::mutex mutex_;
   // The mutex guards the members below, and changes of `running_`.

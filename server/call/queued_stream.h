@@ -56,29 +56,25 @@ class QueuedStream : public CallStream<Reactor> {
   virtual bool IsWorking() const { return false; }
   // Returns true if the only queued reply must wait to be merged with later ones, which saves
   // writes. In that case, a Locked step must follow soon.
-  virtual bool KeepsWaiting() const { return false; }
+  virtual bool KeepsWaiting() { return false; }
 
   // Queues a reply. bytes: its size, if the stream bounds its queue.
   void Queue(Reply reply, size_t bytes = 0) {
     unsent_bytes_ += bytes;
     waiting_.push_back({std::move(reply), bytes, std::chrono::steady_clock::now()});
   }
+  struct Waiting {
+    Reply reply;
+    size_t bytes;
+    std::chrono::steady_clock::time_point since;
+  };
   // The last queued reply, for merging more into it; null if the queue is empty.
-  Reply* LastWaiting() { return waiting_.empty() ? nullptr : &waiting_.back().reply; }
-  size_t LastWaitingBytes() const { return waiting_.empty() ? 0 : waiting_.back().bytes; }
+  Waiting* LastWaiting() { return waiting_.empty() ? nullptr : &waiting_.back(); }
   // Adds to the size of the last queued reply.
   void GrowLastWaiting(size_t bytes) {
     HULLD_CHECK(!waiting_.empty());
     waiting_.back().bytes += bytes;
     unsent_bytes_ += bytes;
-  }
-  // Time since the last queued reply was queued.
-  std::chrono::steady_clock::duration LastWaitingTime() const {
-    return std::chrono::steady_clock::now() - waiting_.back().since;
-  }
-  void DropWaiting() {
-    for (const Waiting& dropped : waiting_) unsent_bytes_ -= dropped.bytes;
-    waiting_.clear();
   }
   // Total size of the queued replies and of the one being written.
   size_t unsent_bytes() const { return unsent_bytes_; }
@@ -92,12 +88,6 @@ class QueuedStream : public CallStream<Reactor> {
   const std::optional<absl::Status>& end() const { return end_; }
 
  private:
-  struct Waiting {
-    Reply reply;
-    size_t bytes;
-    std::chrono::steady_clock::time_point since;
-  };
-
   void OnWriteDone(bool ok) final {
     Locked([this, ok] {
       HULLD_CHECK(std::exchange(writing_, false));
@@ -114,7 +104,8 @@ class QueuedStream : public CallStream<Reactor> {
   // Ends the call: the client stopped reading or was revoked.
   void Abandon() {
     this->call().Cancel();
-    DropWaiting();
+    for (const Waiting& dropped : waiting_) unsent_bytes_ -= dropped.bytes;
+    waiting_.clear();
     End(this->call().StopStatus());
   }
 

@@ -293,7 +293,7 @@ void CollisionStream::AnswerSlice() {
     if (next_row_ < table_.table_rows()) return SendPart(false);
     reply_bytes_ = reply().ByteSizeLong();
   }
-  const bool is_plain = IsPlain();
+  const bool is_plain = AsksRelationsOfHulls(options_, table_);
   const std::span<const uint32_t> asked = pairs_.selected();
   if (is_plain && decided_.size() < asked.size()) return DecideTogether();
   const auto end = std::chrono::steady_clock::now() + TaskPool::kSliceTime;
@@ -307,10 +307,6 @@ void CollisionStream::AnswerSlice() {
       return RunOn(lane_, [this] { AnswerSlice(); });
     }
   }
-  SendAnswered();
-}
-
-void CollisionStream::SendAnswered() {
   call().metrics().CountPairs(std::exchange(rungs_, {}));
   if (call().ShouldStop()) return FinishCall(call().StopStatus());
   const bool is_last = next_asked_ == pairs_.selected().size();

@@ -54,7 +54,6 @@ class CollisionStream
   void OnSent() override;
 
   bool IsQuick() const;
-  bool IsPlain() const { return AsksRelationsOfHulls(options_, table_); }
   void Handle();
   absl::Status HandleMessage();
   absl::Status OfMessage(const absl::Status& status) const;
@@ -69,7 +68,6 @@ class CollisionStream
   void Decide(uint32_t i);
   void AddDecided(size_t i);
   void AnswerSlice();
-  void SendAnswered();
   void SendPart(bool last);
 
   const ServiceParts& parts_;

@@ -183,16 +183,16 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
 
   // Queues a reply, or merges it into the last queued one if both are small and fit together.
   void QueueOrJoin(Reply reply, size_t bytes) {
-    Reply* const waiting = this->LastWaiting();
-    const bool is_small =
-        bytes <= kSmallReplyBytes && this->LastWaitingBytes() + bytes <= Config::kReplyMessageBytes;
-    if (!is_small || waiting == nullptr) return this->Queue(std::move(reply), bytes);
-    const bool is_head = waiting->columns().relations().empty();
+    auto* const waiting = this->LastWaiting();
+    const bool is_small = waiting != nullptr && bytes <= kSmallReplyBytes &&
+                          waiting->bytes + bytes <= Config::kReplyMessageBytes;
+    if (!is_small) return this->Queue(std::move(reply), bytes);
+    const bool is_head = waiting->reply.columns().relations().empty();
     const bool fits = is_head ? shape_.joins_head : !NamesRows(reply.columns());
     if (!fits) return this->Queue(std::move(reply), bytes);
     // The merged message keeps its first pair.
     if constexpr (requires { reply.clear_first_pair(); }) reply.clear_first_pair();
-    waiting->MergeFrom(reply);
+    waiting->reply.MergeFrom(reply);
     this->GrowLastWaiting(bytes);
   }
 
@@ -300,10 +300,10 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   bool IsWorking() const final { return opening_ || running_ > 0; }
 
   // The end of the preparation and of each slice is a Locked step.
-  bool KeepsWaiting() const final {
+  bool KeepsWaiting() final {
     if (holds_head_) return opening_ || running_ > 0;
-    return running_ > 0 && this->LastWaitingBytes() <= kSmallReplyBytes &&
-           this->LastWaitingTime() < kMaxWait;
+    return running_ > 0 && this->LastWaiting()->bytes <= kSmallReplyBytes &&
+           Clock::now() - this->LastWaiting()->since < kMaxWait;
   }
 
   // Queues the next message of the table of hulls, which precedes all answers. Returns true if more
@@ -326,22 +326,18 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
       if (!front.is_done()) break;
       pieces_.pop_front();
     }
-    NoteHeldBytes();
+    size_t held_bytes = fixed_bytes_ + this->unsent_bytes();
+    for (const std::unique_ptr<Work>& piece : pieces_) {
+      if (!piece->is_running) piece->noted_bytes = piece->bytes + piece->held_bytes();
+      held_bytes += piece->noted_bytes;
+    }
+    charge_.Set(held_bytes);
     if (is_head_left_) return;
     if (pieces_.empty() && next_unit_ == unit_count_) unit_count_ += CountFollowingUnits();
     if (this->unsent_bytes() < kMaxUnsentBytes) StartSlices();
     if (!pieces_.empty() || next_unit_ < unit_count_) return;
     OnAllDelivered();
     this->End(absl::OkStatus());
-  }
-
-  void NoteHeldBytes() {
-    size_t bytes = fixed_bytes_ + this->unsent_bytes();
-    for (const std::unique_ptr<Work>& piece : pieces_) {
-      if (!piece->is_running) piece->noted_bytes = piece->bytes + piece->held_bytes();
-      bytes += piece->noted_bytes;
-    }
-    charge_.Set(bytes);
   }
 
   void StartSlices() {

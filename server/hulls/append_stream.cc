@@ -157,8 +157,8 @@ void AppendStream::HandleResult(const SequenceResult& chunk) {
   if (call().ShouldStop()) return;  // the client disconnected
   // `opened` is sent before the first chunk is read, so a queued reply can only be an ack.
   if (LastWaiting() == nullptr) Queue({});
-  HULLD_CHECK(!LastWaiting()->has_opened());
-  v1::AppendAck* ack = LastWaiting()->mutable_ack();
+  HULLD_CHECK(!LastWaiting()->reply.has_opened());
+  v1::AppendAck* ack = LastWaiting()->reply.mutable_ack();
   EncodeHeader(parts_.store, result->store_revision, ack->mutable_header());
   ack->set_sequence(std::max(ack->sequence(), sequence));
   if (ack->outcome() != v1::APPEND_OUTCOME_APPLIED) {

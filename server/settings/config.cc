@@ -1,6 +1,7 @@
 #include "server/settings/config.h"
 
 #include <absl/status/status.h>
+#include <absl/strings/numbers.h>
 #include <absl/strings/str_cat.h>
 #include <unistd.h>
 
@@ -144,9 +145,7 @@ std::string LineOf(const std::string& path, size_t number) {
 // Returns an empty string if `text` is a number of seconds up to a day; NaN is not.
 std::string CheckSeconds(const std::string& text) {
   double seconds = -1;
-  const char* end = text.data() + text.size();
-  const auto [parsed, error] = std::from_chars(text.data(), end, seconds);
-  if (error == std::errc() && parsed == end && seconds >= 0 && seconds <= 86400) return "";
+  if (absl::SimpleAtod(text, &seconds) && seconds >= 0 && seconds <= 86400) return "";
   return absl::StrCat("\"", text, "\" is not a number of seconds from 0 to 86400");
 }
 
@@ -449,9 +448,7 @@ class Parser {
                 uint64_t most = kAnyNumber) {
     const auto check = [most](const std::string& text) -> std::string {
       uint64_t number = 0;
-      const char* end = text.data() + text.size();
-      const auto [parsed, error] = std::from_chars(text.data(), end, number);
-      if (error == std::errc() && parsed == end && number >= 1 && number <= most) return "";
+      if (absl::SimpleAtoi(text, &number) && number >= 1 && number <= most) return "";
       return absl::StrCat("\"", text, "\" is not a whole number from 1 to ", most);
     };
     Add(name, value, description)->check(CLI::Validator(check, ""))->type_name("N");
