@@ -56,11 +56,12 @@ absl::StatusOr<StoredBody> DecodeBody(const v1::PutBodyRequest& request, const C
       return absl::InvalidArgumentError(absl::StrCat(
           "pieces[", i, "].end_pose is set; a piece cannot move relative to its body"));
     }
-    const absl::StatusOr<Pose> pose = DecodePose(piece.pose());
-    if (!pose.ok()) return Prefixed(absl::StrCat("pieces[", i, "].pose."), pose.status());
+    const Pose pose = ReadPose(piece.pose());
+    const absl::Status posed = ValidatePose(pose);
+    if (!posed.ok()) return Prefixed(absl::StrCat("pieces[", i, "].pose."), posed);
     const absl::Status radius = ValidateRadius(piece.radius());
     if (!radius.ok()) return Prefixed(absl::StrCat("pieces[", i, "].radius"), radius);
-    body.pieces.push_back({known->second, *pose, piece.radius()});
+    body.pieces.push_back({known->second, pose, piece.radius()});
   }
   return body;
 }

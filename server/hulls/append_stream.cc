@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/base/check.h"
+#include "core/base/status_macros.h"
 #include "server/process/random_id.h"
 #include "server/wire/decode.h"
 #include "server/wire/encode.h"
@@ -56,27 +57,21 @@ void AppendStream::StartWork() {
 
 void AppendStream::OnMessage() {
   if (end().has_value()) return;
-  switch (request().message_case()) {
-    case v1::AppendPointsRequest::kOpen:
-      return HandleOpen(request().open());
-    case v1::AppendPointsRequest::kChunk:
-      return HandleChunk(request().chunk());
-    case v1::AppendPointsRequest::MESSAGE_NOT_SET:
-      return Fail(absl::InvalidArgumentError("the message is empty; set open or chunk"));
-  }
+  absl::Status status = absl::InvalidArgumentError("the message is empty; set open or chunk");
+  if (request().has_open()) status = HandleOpen(request().open());
+  if (request().has_chunk()) status = HandleChunk(request().chunk());
+  if (!status.ok()) Fail(status);
 }
 
 void AppendStream::OnNoMessage(const absl::Status& why) { Fail(OrStopped(why)); }
 
-void AppendStream::HandleOpen(const v1::AppendOpen& open) {
+absl::Status AppendStream::HandleOpen(const v1::AppendOpen& open) {
   if (session_.has_value()) {
-    return Fail(absl::InvalidArgumentError(
-        "open was sent twice; a stream appends to one hull; start a new stream"));
+    return absl::InvalidArgumentError(
+        "open was sent twice; a stream appends to one hull; start a new stream");
   }
-  if (absl::Status s = CheckHullId(call().caller(), open.hull_id(), "open.hull_id"); !s.ok()) {
-    return Fail(s);
-  }
-  if (absl::Status s = ValidateWriterId(open.writer_id()); !s.ok()) return Fail(s);
+  HULLD_RETURN_IF_ERROR(CheckHullId(call().caller(), open.hull_id(), "open.hull_id"));
+  HULLD_RETURN_IF_ERROR(ValidateWriterId(open.writer_id()));
   writer_id_ = open.writer_id().empty() ? RandomId() : open.writer_id();
   opening_ = true;
   const auto on_gone = [weak = weak_from_this()](const absl::Status& reason) {
@@ -95,6 +90,7 @@ void AppendStream::HandleOpen(const v1::AppendOpen& open) {
         });
       },
       call().client());
+  return absl::OkStatus();
 }
 
 void AppendStream::HandleOpened(const absl::StatusOr<OpenResult>& opened) {
@@ -113,22 +109,22 @@ void AppendStream::HandleOpened(const absl::StatusOr<OpenResult>& opened) {
   Queue(std::move(opened_reply));
 }
 
-void AppendStream::HandleChunk(const v1::AppendChunk& message) {
+absl::Status AppendStream::HandleChunk(const v1::AppendChunk& message) {
   if (!session_.has_value()) {
-    return Fail(absl::InvalidArgumentError("the first message must be open, not a chunk"));
+    return absl::InvalidArgumentError("the first message must be open, not a chunk");
   }
-  absl::StatusOr<Chunk> chunk = DecodeChunk(message, parts_.registry.limits().max_points_per_chunk);
-  if (!chunk.ok()) return Fail(chunk.status());
+  HULLD_ASSIGN_OR_RETURN(Chunk chunk,
+                         DecodeChunk(message, parts_.registry.limits().max_points_per_chunk));
   request().Clear();
   ++unbuilt_;
   ++uncommitted_;
-  call().AddPoints(chunk->points.size());
+  call().AddPoints(chunk.points.size());
   const auto self = shared_from_this();
-  const uint64_t sequence = chunk->sequence;
+  const uint64_t sequence = chunk.sequence;
   const uint64_t number = results_.Number();
   const auto arrival = std::chrono::steady_clock::now();
   parts_.registry.hulls().Append(
-      *session_, *std::move(chunk), [this, self] { return call().ShouldStop(); },
+      *session_, std::move(chunk), [this, self] { return call().ShouldStop(); },
       [this, self] { Locked([this] { --unbuilt_; }); },
       [this, self, sequence, number, arrival](const absl::StatusOr<ChunkResult>& result) {
         Locked([&] {
@@ -138,6 +134,7 @@ void AppendStream::HandleChunk(const v1::AppendChunk& message) {
                         [this](const SequenceResult& each) { HandleResult(each); });
         });
       });
+  return absl::OkStatus();
 }
 
 void AppendStream::HandleResult(const SequenceResult& chunk) {

@@ -40,8 +40,8 @@ class AppendStream : public ReadingStream<QueuedStream<BidiReactor, v1::AppendPo
   bool IsWorking() const override { return opening_ || unbuilt_ > 0 || uncommitted_ > 0; }
   void OnMessage() override;
   void OnNoMessage(const absl::Status& why) override;
-  void HandleOpen(const v1::AppendOpen& open);
-  void HandleChunk(const v1::AppendChunk& message);
+  absl::Status HandleOpen(const v1::AppendOpen& open);
+  absl::Status HandleChunk(const v1::AppendChunk& message);
   void HandleOpened(const absl::StatusOr<OpenResult>& opened);
   void HandleResult(const SequenceResult& chunk);
   void LogApplied();

@@ -57,20 +57,14 @@ absl::Status MeshStream::Simplify(const v1::Simplification& simplification,
   const SimplifyTarget target = {static_cast<size_t>(simplification.max_vertices()),
                                  simplification.max_error(),
                                  [this] { return call().ShouldStop(); }};
-  absl::StatusOr<SimplifiedHull> simplified;
-  switch (simplification.side()) {
-    case v1::SIMPLIFICATION_SIDE_INSIDE:
-      simplified = SimplifyInside(*mesh_, target);
-      break;
-    case v1::SIMPLIFICATION_SIDE_OUTSIDE:
-      simplified = SimplifyOutside(*mesh_, target);
-      break;
-    default:
-      return absl::InvalidArgumentError("side must be INSIDE or OUTSIDE");
+  const bool is_inside = simplification.side() == v1::SIMPLIFICATION_SIDE_INSIDE;
+  if (!is_inside && simplification.side() != v1::SIMPLIFICATION_SIDE_OUTSIDE) {
+    return absl::InvalidArgumentError("side must be INSIDE or OUTSIDE");
   }
-  if (!simplified.ok()) return simplified.status();
-  header->set_error(simplified->error);
-  mesh_ = std::make_shared<const Hull>(std::move(simplified->hull));
+  HULLD_ASSIGN_OR_RETURN(SimplifiedHull simplified, is_inside ? SimplifyInside(*mesh_, target)
+                                                              : SimplifyOutside(*mesh_, target));
+  header->set_error(simplified.error);
+  mesh_ = std::make_shared<const Hull>(std::move(simplified.hull));
   return absl::OkStatus();
 }
 

@@ -41,20 +41,16 @@ void ReplaceStream::OnMessage() {
 // Handles a message, except for building.
 absl::Status ReplaceStream::HandleMessage() {
   const bool opened = replacement_.builder != nullptr;
-  switch (request().message_case()) {
-    case v1::ReplaceHullRequest::kOpen:
-      if (!opened) return HandleOpen(request().open());
-      return absl::InvalidArgumentError("open was sent twice; start a new stream");
-    case v1::ReplaceHullRequest::kPoints:
-      if (!opened) {
-        return absl::InvalidArgumentError("the first message must be open, not points");
-      }
-      complete_ = request().points().xyz().empty() && request().points().xyz_float().empty();
-      return absl::OkStatus();
-    case v1::ReplaceHullRequest::MESSAGE_NOT_SET:
-      break;
+  if (request().has_open()) {
+    if (!opened) return HandleOpen(request().open());
+    return absl::InvalidArgumentError("open was sent twice; start a new stream");
   }
-  return absl::InvalidArgumentError("the message is empty; set open or points");
+  if (!request().has_points()) {
+    return absl::InvalidArgumentError("the message is empty; set open or points");
+  }
+  if (!opened) return absl::InvalidArgumentError("the first message must be open, not points");
+  complete_ = request().points().xyz().empty() && request().points().xyz_float().empty();
+  return absl::OkStatus();
 }
 
 absl::Status ReplaceStream::HandleOpen(const v1::ReplaceOpen& open) {

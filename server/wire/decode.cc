@@ -129,12 +129,6 @@ Pose ReadPose(const v1::Pose& message) {
   return pose;
 }
 
-absl::StatusOr<Pose> DecodePose(const v1::Pose& message) {
-  const Pose pose = ReadPose(message);
-  HULLD_RETURN_IF_ERROR(ValidatePose(pose));
-  return pose;
-}
-
 absl::Status ValidateRadius(double radius) {
   if (IsValidRadius(radius)) return absl::OkStatus();
   return absl::InvalidArgumentError(absl::StrCat(" is ",
@@ -170,20 +164,6 @@ absl::StatusOr<Freshness> DecodeFreshness(const v1::Freshness& message, const St
     freshness.max_staleness = std::nullopt;
   }
   return freshness;
-}
-
-absl::StatusOr<Method> DecodeMethod(v1::Method method) {
-  switch (method) {
-    case v1::METHOD_UNSPECIFIED:
-    case v1::METHOD_CERTIFIED_SEARCH:
-      return Method::kCertifiedSearch;
-    case v1::METHOD_TEXTBOOK_SAT:
-      return Method::kTextbookSat;
-    default:
-      return absl::InvalidArgumentError(
-          absl::StrCat("method is ", static_cast<int>(method),
-                       "; use METHOD_CERTIFIED_SEARCH (the default) or METHOD_TEXTBOOK_SAT"));
-  }
 }
 
 }  // namespace hulld::server

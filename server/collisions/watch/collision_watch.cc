@@ -33,19 +33,14 @@ bool IsContact(v1::Relation relation) {
 
 // Returns the kind of the pair's event; UNSPECIFIED if the pair is unchanged.
 v1::CollisionEventKind KindOf(const LivePair& before, v1::Relation relation, bool is_within) {
-  switch (relation) {
-    case v1::RELATION_OVERLAPPING:
-      if (before.relation == relation) break;
-      return v1::COLLISION_EVENT_KIND_ENTER;
-    case v1::RELATION_TOUCHING:
-      if (before.relation == relation) break;
-      return v1::COLLISION_EVENT_KIND_TOUCH;
-    default:
-      if (IsContact(before.relation)) return v1::COLLISION_EVENT_KIND_EXIT;
-      if (is_within == before.is_within_clearance) break;
-      return is_within ? v1::COLLISION_EVENT_KIND_NEAR : v1::COLLISION_EVENT_KIND_FAR;
+  if (IsContact(relation)) {
+    if (relation == before.relation) return v1::COLLISION_EVENT_KIND_UNSPECIFIED;
+    return relation == v1::RELATION_OVERLAPPING ? v1::COLLISION_EVENT_KIND_ENTER
+                                                : v1::COLLISION_EVENT_KIND_TOUCH;
   }
-  return v1::COLLISION_EVENT_KIND_UNSPECIFIED;
+  if (IsContact(before.relation)) return v1::COLLISION_EVENT_KIND_EXIT;
+  if (is_within == before.is_within_clearance) return v1::COLLISION_EVENT_KIND_UNSPECIFIED;
+  return is_within ? v1::COLLISION_EVENT_KIND_NEAR : v1::COLLISION_EVENT_KIND_FAR;
 }
 
 }  // namespace
