@@ -32,6 +32,7 @@ class HealthService::WatchCall
  public:
   WatchCall(CallContext& context, HealthService& service, const Bytes& bytes)
       : RequestStream(bytes, context, service.admission_, Rpc::kHealthWatch), service_(service) {}
+
   // Queues a report, and the end of the call if `then` is given.
   void Report(Status status, const std::optional<absl::Status>& then) {
     Locked([&] {

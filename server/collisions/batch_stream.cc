@@ -33,8 +33,7 @@ absl::Status BatchStream::Validate() {
   expected_pairs_ = CountUnits();
   // Each placement is used at most twice on average, so placing it again costs less than memory for
   // all of them.
-  const bool is_textbook = query_.method == Method::kTextbookSat;
-  if (!is_textbook && expected_pairs_ <= table_.size()) table_.PlaceOnDemand();
+  if (!IsTextbook() && expected_pairs_ <= table_.size()) table_.PlaceOnDemand();
   call().AddPairs(expected_pairs_);
   return ValidatePairs(request().pairs(), table_.size(), registry().limits().max_pairs_per_batch,
                        "the batch");

@@ -102,13 +102,14 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     int max_short_placements;
     // True if the first answers may join the last message of the head.
     bool joins_head;
-    // Steps of the fastest kind between two reads of the clock.
+    // Steps between two reads of the clock, for pairs of hulls at rest.
     uint64_t steps_per_look;
   };
 
   PiecedReplies(const Bytes& request, CallContext& context, Rpc rpc, const ServiceParts& parts,
                 const Shape& shape)
       : Base(request, context, parts.admission, rpc),
+        steps_per_look_(shape.steps_per_look),
         parts_(parts),
         lane_(parts.pool),
         max_pieces_(2 * parts.pool.threads()),
@@ -143,6 +144,7 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   }
 
   Registry& registry() { return parts_.registry; }
+  bool IsTextbook() const { return query_.method == Method::kTextbookSat; }
 
   // Runs `work` on disjoint ranges that cover [0, count), on several threads concurrently for a
   // long call. Used by the steps above.
@@ -203,6 +205,8 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   PlacementTable table_;
   // Minimum number of pairs that the call queries.
   uint64_t expected_pairs_ = 0;
+  // Steps between two reads of the clock. Written while no slice runs.
+  uint64_t steps_per_look_;
 
  private:
   // Returns true if preparation takes at most about a slice, excluding waits.
@@ -247,6 +251,8 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     this->Locked([this, &status] {
       opening_ = false;
       if (!status.ok()) return this->End(status);
+      const bool is_slow = table_.has_bodies() || table_.has_motions() || IsTextbook();
+      if (is_slow) steps_per_look_ = 1;
       unit_count_ = CountUnits();
     });
   }
@@ -269,10 +275,8 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
 
   // Works on the piece until `end`, or until it is done.
   absl::Status Advance(Work& piece, Clock::time_point end) {
-    const bool is_quick = AsksRelationsOfHulls(query_, table_);
     do {
-      for (uint64_t left = is_quick ? shape_.steps_per_look : 1; left > 0 && !piece.is_done();
-           --left) {
+      for (uint64_t left = steps_per_look_; left > 0 && !piece.is_done(); --left) {
         HULLD_RETURN_IF_ERROR(Step(piece, end));
       }
     } while (!piece.is_done() && Clock::now() < end);
@@ -348,12 +352,11 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
       next_unit_ = piece->end;
       pieces_.push_back(std::move(piece));
     }
-    // A textbook pair holds memory once started, so only one is started at a time.
-    const bool is_textbook = query_.method == Method::kTextbookSat;
     for (const std::unique_ptr<Work>& piece : pieces_) {
       if (piece->is_running || piece->is_done()) continue;
       const bool is_front = piece == pieces_.front();
-      if (!is_front && (piece->bytes >= kMaxHeldBytes || is_textbook)) continue;
+      // A textbook pair holds memory once started, so only one is started at a time.
+      if (!is_front && (piece->bytes >= kMaxHeldBytes || IsTextbook())) continue;
       piece->is_running = true;
       ++running_;
       this->RunOn(lane_, [this, each = piece.get()] { RunSlice(*each); });

@@ -267,6 +267,7 @@ uint64_t SceneStream::CountFollowingUnits() {
   ranked_ = ranking_->Take();
   query_ = ranked_query_;
   motion_options_.want_certificate = query_.want_certificate;
+  steps_per_look_ = 1;
   return ranked_.size();
 }
 
