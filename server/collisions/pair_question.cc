@@ -111,7 +111,10 @@ void PairQuestion::AnswerResolved() {
   if (absl::Status s = Begin(); !s.ok()) return call_->End(s);
   // Answers to a client with many calls take turns in the pool, because gRPC's threads process
   // calls in the order of arrival.
-  if (IsQuick() && !call_->call().is_one_of_many()) return RunSlice();
+  const bool is_quick = AsksRelationsOfHulls(options_, table_) &&
+                        IsQuickToRelate(table_.HullAt(kA)) && IsQuickToRelate(table_.HullAt(kB)) &&
+                        !call_->call().is_one_of_many();
+  if (is_quick) return RunSlice();
   parts_.pool.Submit([self = shared_from_this()] { self->RunSlice(); }, call_->call().client());
 }
 
@@ -125,12 +128,6 @@ absl::Status PairQuestion::Begin() {
   table_.EncodeHull(*table_.hull_of(kB), response.mutable_hull_b());
   search_.emplace(table_, kA, kB, options_, motion_options_);
   return search_->CheckMemory(parts_.registry);
-}
-
-// Returns true if the answer may be computed on a gRPC thread.
-bool PairQuestion::IsQuick() const {
-  return AsksRelationsOfHulls(options_, table_) && IsQuickToRelate(table_.HullAt(kA)) &&
-         IsQuickToRelate(table_.HullAt(kB));
 }
 
 void PairQuestion::RunSlice() {

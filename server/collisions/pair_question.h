@@ -42,7 +42,6 @@ class PairQuestion : public std::enable_shared_from_this<PairQuestion> {
   // the pool, with the first slice ahead of those of batches.
   void AnswerResolved();
   absl::Status Begin();
-  bool IsQuick() const;
   void RunSlice();
   // Fills the response.
   absl::Status Encode();
