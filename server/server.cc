@@ -161,7 +161,7 @@ constexpr Reading kCounters[] = {
 Server::Server(const Config& config, std::unique_ptr<Guard> guard, std::unique_ptr<Store> store)
     : guard_(std::move(guard)),
       connection_table_(config.limits.max_connections, config.limits.max_connections_per_address),
-      admission_(config.limits, metrics_),
+      admission_(config.limits, metrics_, connection_table_, guard_.get()),
       store_(std::move(store)),
       writers_(PoolThreads(), metrics_.AddPool("writers")),
       registry_(*store_, config.limits, writers_, metrics_.AddPool("preparers"),
@@ -169,23 +169,20 @@ Server::Server(const Config& config, std::unique_ptr<Guard> guard, std::unique_p
       readers_(PoolThreads(), metrics_.AddPool("readers")),
       long_readers_(PoolThreads(), metrics_.AddPool("long_readers")),
       pool_(AnswerThreads(config), metrics_.AddPool("single_calls"), metrics_.AddPool("slices")),
-      hull_service_(registry_, admission_, writers_, readers_, long_readers_),
-      body_service_(registry_, admission_, readers_),
-      collision_service_(registry_, admission_, readers_, long_readers_, pool_),
-      status_service_(registry_, admission_),
-      maintenance_service_(*store_, registry_, admission_, long_readers_),
+      parts_{*store_, registry_, admission_, writers_, readers_, long_readers_, pool_, waiting_},
+      hull_service_(parts_),
+      body_service_(parts_),
+      collision_service_(parts_),
+      status_service_(parts_),
+      maintenance_service_(parts_),
       health_service_(admission_, OwnServices()),
       reflection_service_(admission_, AllServices()) {
-  admission_.SetConnections(connection_table_);
-  admission_.SetAuthenticator(guard_->authenticator());
   admission_.SetBacklog([this](Rpc rpc) {
     if (UsesWriters(rpc)) return writers_.waiting();
-    return readers_.waiting() + long_readers_.waiting() + pool_.waiting() +
-           collision_service_.waiting();
+    return readers_.waiting() + long_readers_.waiting() + pool_.waiting() + waiting_.count();
   });
   guard_->OnTokensChanged([this] {
-    const size_t ended = admission_.EndRevoked(
-        [this](const Caller& caller) { return guard_->authenticator().Knows(caller); });
+    const size_t ended = admission_.EndRevoked();
     if (ended > 0) spdlog::info("ended {} calls whose tokens were revoked", ended);
   });
   AddSizesToMetrics();

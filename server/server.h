@@ -99,6 +99,9 @@ class Server {
   TaskPool long_readers_;
   // Compute answers.
   TaskPool pool_;
+  // Calls that wait for the store without occupying a thread.
+  WaitingCalls waiting_;
+  const ServiceParts parts_;
   HullService hull_service_;
   BodyService body_service_;
   CollisionService collision_service_;

@@ -1,15 +1,24 @@
 #include "server/access/guard.h"
 
 #include <absl/status/status.h>
+#include <absl/strings/match.h>
 #include <spdlog/spdlog.h>
 
+#include <optional>
 #include <utility>
 
 #include "core/base/status_macros.h"
-#include "server/access/token_table.h"
+#include "server/contract/error_info.h"
 
 namespace hulld::server {
 namespace {
+
+constexpr char kKey[] = "authorization";
+constexpr char kScheme[] = "Bearer ";
+
+absl::Status Missing(const char* message) {
+  return WithReason(absl::UnauthenticatedError(message), v1::ERROR_REASON_TOKEN_MISSING);
+}
 
 // Logs each new error of a file, and its recovery, once.
 void Complain(const char* what, const absl::Status& status, std::string* complaint) {
@@ -42,6 +51,36 @@ Guard::~Guard() {
   }
   end_.notify_all();
   watcher_.join();
+}
+
+absl::StatusOr<Caller> Guard::Authenticate(
+    const std::multimap<grpc::string_ref, grpc::string_ref>& metadata, Rpc rpc) const {
+  const std::shared_ptr<const TokenTable> tokens = tokens_.load();
+  if (tokens == nullptr) return Caller();
+  const auto [first, last] = metadata.equal_range(kKey);
+  if (first == last) {
+    return Missing("the call has no token; send one as metadata \"authorization: Bearer TOKEN\"");
+  }
+  if (std::next(first) != last) {
+    return Missing("the call has \"authorization\" twice; send one");
+  }
+  const std::string value(first->second.data(), first->second.size());
+  if (!absl::StartsWithIgnoreCase(value, kScheme)) {
+    return Missing("the metadata \"authorization\" must have the form \"Bearer TOKEN\"");
+  }
+  const std::optional<Caller> caller = tokens->Find(value.substr(sizeof kScheme - 1));
+  if (!caller.has_value()) {
+    return WithReason(absl::UnauthenticatedError("the call's token is unknown or no longer valid; "
+                                                 "ask the server's operator for a new one"),
+                      v1::ERROR_REASON_TOKEN_UNKNOWN);
+  }
+  HULLD_RETURN_IF_ERROR(CheckPermission(*caller, rpc));
+  return *caller;
+}
+
+bool Guard::Knows(const Caller& caller) const {
+  const std::shared_ptr<const TokenTable> tokens = tokens_.load();
+  return tokens == nullptr || tokens->Knows(caller);
 }
 
 std::shared_ptr<grpc::ServerCredentials> Guard::credentials() const {
@@ -103,18 +142,18 @@ void Guard::RevokeAuthorities() {
 }
 
 absl::Status Guard::ReloadTokens() {
-  const bool is_first = authenticator_.generation() == 0;
-  HULLD_ASSIGN_OR_RETURN(TokenTable table, ReadTokensFile(config_.tokens_file, !is_first));
-  if (table == tokens_) return absl::OkStatus();
-  tokens_ = std::move(table);
-  authenticator_.SetTokens(tokens_);
-  if (tokens_.empty()) {
+  const std::shared_ptr<const TokenTable> before = tokens_.load();
+  HULLD_ASSIGN_OR_RETURN(TokenTable table, ReadTokensFile(config_.tokens_file, before != nullptr));
+  if (before != nullptr && table == *before) return absl::OkStatus();
+  const auto tokens = std::make_shared<const TokenTable>(std::move(table));
+  tokens_.store(tokens);
+  if (tokens->empty()) {
     spdlog::error(
         "--tokens-file {} is missing or contains no token: all tokens are revoked and all calls "
         "are refused; add a token with 'hullctl token new'",
         config_.tokens_file);
   } else {
-    spdlog::info("{} token{} in force", tokens_.size(), tokens_.size() == 1 ? "" : "s");
+    spdlog::info("{} token{} in force", tokens->size(), tokens->size() == 1 ? "" : "s");
   }
   if (tokens_changed_) tokens_changed_();
   return absl::OkStatus();

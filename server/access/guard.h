@@ -4,15 +4,18 @@
 #include <absl/status/statusor.h>
 #include <grpcpp/grpcpp.h>
 
+#include <atomic>
 #include <condition_variable>
 #include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <string>
 #include <thread>
 
-#include "server/access/authenticator.h"
+#include "server/access/caller.h"
 #include "server/access/tls_credentials.h"
+#include "server/access/token_table.h"
 #include "server/settings/config.h"
 
 namespace hulld::server {
@@ -30,7 +33,16 @@ class Guard {
   Guard& operator=(const Guard&) = delete;
   ~Guard();
 
-  const Authenticator& authenticator() const { return authenticator_; }
+  // Returns the caller, identified by "authorization: Bearer TOKEN" in the metadata of a call.
+  // Without --tokens-file, every caller has all rights. UNAUTHENTICATED: the token is missing or
+  // unknown; the message never repeats it. PERMISSION_DENIED: the token's role does not allow the
+  // call. Thread-safe.
+  absl::StatusOr<Caller> Authenticate(
+      const std::multimap<grpc::string_ref, grpc::string_ref>& metadata, Rpc rpc) const;
+  // Returns true if the token of an authenticated caller is still valid, with the same rights.
+  // Thread-safe.
+  bool Knows(const Caller& caller) const;
+
   // Credentials for the listening port: TLS, or none.
   std::shared_ptr<grpc::ServerCredentials> credentials() const;
 
@@ -53,14 +65,16 @@ class Guard {
   void Watch();
 
   const Config config_;
-  Authenticator authenticator_;
   // Null without TLS.
   std::shared_ptr<TlsCredentials> tls_;
+  // Null: calls need no token.
+  std::atomic<std::shared_ptr<const TokenTable>> tokens_;
 
   std::mutex mutex_;
-  // Files in force, and the last logged error of each. Guarded by mutex_.
+  // Held while files are read. Guards the members below.
+  //
+  // Identity in force, and the last logged error of each kind of file.
   TlsIdentity identity_;
-  TokenTable tokens_;
   std::string tls_complaint_;
   std::string tokens_complaint_;
 

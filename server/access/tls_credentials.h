@@ -27,7 +27,7 @@ class TlsCredentials : public grpc::ServerCredentials {
   // first one had.
   void SetIdentity(TlsIdentity identity);
 
-  // Does nothing: calls are authenticated by Authenticator.
+  // Does nothing: Guard authenticates calls.
   void SetAuthMetadataProcessor(
       const std::shared_ptr<grpc::AuthMetadataProcessor>& processor) override;
 

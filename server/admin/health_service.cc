@@ -32,10 +32,6 @@ class HealthService::WatchCall
  public:
   WatchCall(CallContext& context, HealthService& service, const Bytes& bytes)
       : RequestStream(bytes, context, service.admission_, Rpc::kHealthWatch), service_(service) {}
-  ~WatchCall() override {
-    const std::lock_guard lock(service_.mutex_);
-    service_.watches_.erase(this);
-  }
 
   // Queues a report, and the end of the call if `then` is given.
   void Report(Status status, const std::optional<absl::Status>& then) {
@@ -53,12 +49,16 @@ class HealthService::WatchCall
       const std::lock_guard lock(service_.mutex_);
       status = service_.StatusOf(request().service());
       if (status == HealthCheckResponse::UNKNOWN) status = HealthCheckResponse::SERVICE_UNKNOWN;
-      service_.watches_.emplace(this, std::static_pointer_cast<WatchCall>(shared_from_this()));
+      service_.watches_.insert(std::static_pointer_cast<WatchCall>(shared_from_this()));
     }
     Report(status, std::nullopt);
   }
-  void StartWork() override {}
-  bool IsWorking() const override { return false; }
+  void OnDone() override {
+    const auto self = std::static_pointer_cast<WatchCall>(shared_from_this());
+    RequestStream::OnDone();
+    const std::lock_guard lock(service_.mutex_);
+    service_.watches_.erase(self);
+  }
 
   HealthService& service_;
 };
@@ -104,13 +104,11 @@ WriteReactor* HealthService::Watch(CallContext* context, const Bytes* request) {
 }
 
 void HealthService::EndServing() {
-  std::vector<std::shared_ptr<WatchCall>> open;
+  std::set<std::shared_ptr<WatchCall>> open;
   {
     const std::lock_guard lock(mutex_);
     serving_ = false;
-    for (const auto& [call, watch] : watches_) {
-      if (std::shared_ptr<WatchCall> held = watch.lock()) open.push_back(std::move(held));
-    }
+    open = watches_;
   }
   for (const std::shared_ptr<WatchCall>& watch : open) {
     watch->Report(HealthCheckResponse::NOT_SERVING, Draining());

@@ -3,9 +3,9 @@
 
 #include <grpcpp/grpcpp.h>
 
-#include <map>
 #include <memory>
 #include <mutex>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -46,7 +46,7 @@ class HealthService : public HealthServiceOfBytes {
   std::mutex mutex_;
   // The mutex guards the members below.
   bool serving_ = true;
-  std::map<WatchCall*, std::weak_ptr<WatchCall>> watches_;
+  std::set<std::shared_ptr<WatchCall>> watches_;
 };
 
 }  // namespace hulld::server

@@ -39,12 +39,8 @@ absl::Status CheckSeesAll(const Caller& caller) {
 class BackupStream : public RequestStream<PulledStream<WriteReactor, v1::SaveBackupResponse>,
                                           v1::SaveBackupRequest> {
  public:
-  BackupStream(CallContext& context, Admission& admission, Store& store, const Registry& registry,
-               TaskPool& readers, const Bytes& request)
-      : RequestStream(request, context, admission, Rpc::kSaveBackup),
-        store_(store),
-        registry_(registry),
-        readers_(readers) {}
+  BackupStream(CallContext& context, const ServiceParts& parts, const Bytes& request)
+      : RequestStream(request, context, parts.admission, Rpc::kSaveBackup), parts_(parts) {}
   ~BackupStream() override {
     std::error_code error;
     if (!directory_.empty()) std::filesystem::remove_all(directory_, error);
@@ -53,15 +49,12 @@ class BackupStream : public RequestStream<PulledStream<WriteReactor, v1::SaveBac
  private:
   void Open() override {
     if (absl::Status s = CheckSeesAll(call().caller()); !s.ok()) return FinishCall(s);
-    RunOn(readers_, [this] {
-      if (absl::Status s = Begin(); !s.ok()) return FinishCall(s);
-      Send();
-    });
+    OnSent();
   }
 
   // Makes the copy, and the first message.
-  absl::Status Begin() {
-    HULLD_ASSIGN_OR_RETURN(directory_, store_.MakeCopy());
+  absl::StatusOr<bool> Begin() {
+    HULLD_ASSIGN_OR_RETURN(directory_, parts_.store.MakeCopy());
     std::error_code error;
     for (auto entry = std::filesystem::recursive_directory_iterator(directory_, error);
          !error && entry != std::filesystem::recursive_directory_iterator();
@@ -76,15 +69,15 @@ class BackupStream : public RequestStream<PulledStream<WriteReactor, v1::SaveBac
     std::sort(files_.rbegin(), files_.rend());
     spdlog::info("sending a backup of the store");
     v1::BackupBegin* begin = reply().mutable_begin();
-    EncodeHeader(registry_.store(), registry_.Sizes().store_revision, begin->mutable_header());
+    EncodeHeader(parts_.store, parts_.registry.Sizes().store_revision, begin->mutable_header());
     begin->set_version(HULLD_VERSION);
     begin->set_store_format(kStoreFormat);
-    return absl::OkStatus();
+    return true;
   }
 
   // Runs on a reader thread, since it reads files.
   void OnSent() override {
-    RunOn(readers_, [this] {
+    RunOn(parts_.long_readers, [this] {
       const absl::StatusOr<bool> more = NextMessage();
       if (!more.ok()) return FinishCall(more.status());
       if (!*more) {
@@ -98,6 +91,7 @@ class BackupStream : public RequestStream<PulledStream<WriteReactor, v1::SaveBac
   // Fills the reply with the next part. Returns false after the last one.
   absl::StatusOr<bool> NextMessage() {
     reply().Clear();
+    if (directory_.empty()) return Begin();
     if (!files_.empty()) return NextPiece();
     if (std::exchange(ended_, true)) return false;
     *reply().mutable_end() = totals_;
@@ -134,9 +128,7 @@ class BackupStream : public RequestStream<PulledStream<WriteReactor, v1::SaveBac
     return true;
   }
 
-  Store& store_;
-  const Registry& registry_;
-  TaskPool& readers_;
+  const ServiceParts& parts_;
   std::string directory_;
   // Paths relative to directory_. The last one is sent first.
   std::vector<std::string> files_;
@@ -149,8 +141,7 @@ class BackupStream : public RequestStream<PulledStream<WriteReactor, v1::SaveBac
 }  // namespace
 
 WriteReactor* MaintenanceService::SaveBackup(CallContext* context, const Bytes* request) {
-  return BackupStream::Launch(
-      std::make_shared<BackupStream>(*context, admission_, store_, registry_, readers_, *request));
+  return BackupStream::Launch(std::make_shared<BackupStream>(*context, parts_, *request));
 }
 
 }  // namespace hulld::server

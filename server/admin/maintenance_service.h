@@ -4,11 +4,8 @@
 #include <grpcpp/grpcpp.h>
 
 #include "hulld/v1/maintenance.grpc.pb.h"
-#include "server/call/admission.h"
 #include "server/call/call_stream.h"
-#include "server/process/task_pool.h"
-#include "server/registry/registry.h"
-#include "server/store/store.h"
+#include "server/call/service_parts.h"
 
 namespace hulld::server {
 
@@ -16,18 +13,12 @@ namespace hulld::server {
 class MaintenanceService : public v1::MaintenanceService::WithRawCallbackMethod_SaveBackup<
                                v1::MaintenanceService::Service> {
  public:
-  // Backups are read on `readers`. All must outlive this.
-  MaintenanceService(Store& store, const Registry& registry, Admission& admission,
-                     TaskPool& readers)
-      : store_(store), registry_(registry), admission_(admission), readers_(readers) {}
+  explicit MaintenanceService(const ServiceParts& parts) : parts_(parts) {}
 
   WriteReactor* SaveBackup(CallContext* context, const Bytes* request) override;
 
  private:
-  Store& store_;
-  const Registry& registry_;
-  Admission& admission_;
-  TaskPool& readers_;
+  const ServiceParts& parts_;
 };
 
 }  // namespace hulld::server

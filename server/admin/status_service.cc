@@ -1,6 +1,7 @@
 #include "server/admin/status_service.h"
 
 #include <absl/status/status.h>
+#include <google/protobuf/util/time_util.h>
 
 #include "server/call/unary_call.h"
 #include "server/wire/encode.h"
@@ -10,7 +11,7 @@ namespace hulld::server {
 UnaryReactor* StatusService::GetStatus(CallContext* context, const Bytes* request,
                                        Bytes* response) {
   using StatusCall = UnaryCall<v1::GetStatusRequest, v1::GetStatusResponse>;
-  return StatusCall::Start(*context, admission_, Rpc::kGetStatus, {request, response},
+  return StatusCall::Start(context, parts_.admission, Rpc::kGetStatus, request, response,
                            [this](StatusCall* call) {
                              Fill(call->call().caller(), &call->response());
                              call->End(absl::OkStatus());
@@ -18,22 +19,20 @@ UnaryReactor* StatusService::GetStatus(CallContext* context, const Bytes* reques
 }
 
 void StatusService::Fill(const Caller& caller, v1::GetStatusResponse* response) const {
-  const RegistrySizes sizes = registry_.Sizes();
-  EncodeHeader(registry_.store(), sizes.store_revision, response->mutable_header());
+  const RegistrySizes sizes = parts_.registry.Sizes();
+  EncodeHeader(parts_.store, sizes.store_revision, response->mutable_header());
   response->set_version(HULLD_VERSION);
-  const auto started = started_.time_since_epoch();
-  const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(started);
-  response->mutable_started()->set_seconds(seconds.count());
-  response->mutable_started()->set_nanos(static_cast<int32_t>(
-      std::chrono::duration_cast<std::chrono::nanoseconds>(started - seconds).count()));
+  const std::chrono::nanoseconds started = started_.time_since_epoch();
+  *response->mutable_started() =
+      google::protobuf::util::TimeUtil::NanosecondsToTimestamp(started.count());
   EncodeDuration(std::chrono::steady_clock::now() - started_steady_, response->mutable_uptime());
-  response->set_store_kind(registry_.store().kind());
+  response->set_store_kind(parts_.store.kind());
   if (caller.sees_all()) {
     response->set_hull_count(sizes.hull_count);
     response->set_vertex_count(sizes.vertex_count);
     response->set_body_count(sizes.body_count);
   }
-  const Limits& limits = registry_.limits();
+  const Limits& limits = parts_.registry.limits();
   v1::Limits* message = response->mutable_limits();
   message->set_max_points_per_chunk(limits.max_points_per_chunk);
   message->set_max_vertices_per_hull(limits.max_vertices_per_hull);

@@ -7,9 +7,8 @@
 
 #include "hulld/v1/status.grpc.pb.h"
 #include "server/access/caller.h"
-#include "server/call/admission.h"
 #include "server/call/message_bytes.h"
-#include "server/registry/registry.h"
+#include "server/call/service_parts.h"
 
 namespace hulld::server {
 
@@ -17,16 +16,14 @@ namespace hulld::server {
 class StatusService
     : public v1::StatusService::WithRawCallbackMethod_GetStatus<v1::StatusService::Service> {
  public:
-  StatusService(Registry& registry, Admission& admission)
-      : registry_(registry), admission_(admission) {}
+  explicit StatusService(const ServiceParts& parts) : parts_(parts) {}
 
   UnaryReactor* GetStatus(CallContext* context, const Bytes* request, Bytes* response) override;
 
  private:
   void Fill(const Caller& caller, v1::GetStatusResponse* response) const;
 
-  Registry& registry_;
-  Admission& admission_;
+  const ServiceParts& parts_;
   const std::chrono::system_clock::time_point started_ = std::chrono::system_clock::now();
   const std::chrono::steady_clock::time_point started_steady_ = std::chrono::steady_clock::now();
 };

@@ -56,11 +56,12 @@ absl::StatusOr<StoredBody> DecodeBody(const v1::PutBodyRequest& request, const C
       return absl::InvalidArgumentError(absl::StrCat(
           "pieces[", i, "].end_pose is set; a piece cannot move relative to its body"));
     }
-    const absl::StatusOr<Pose> pose = DecodePose(piece.pose());
-    if (!pose.ok()) return Prefixed(absl::StrCat("pieces[", i, "].pose."), pose.status());
+    const Pose pose = ReadPose(piece.pose());
+    const absl::Status posed = ValidatePose(pose);
+    if (!posed.ok()) return Prefixed(absl::StrCat("pieces[", i, "].pose."), posed);
     const absl::Status radius = ValidateRadius(piece.radius());
     if (!radius.ok()) return Prefixed(absl::StrCat("pieces[", i, "].radius"), radius);
-    body.pieces.push_back({known->second, *pose, piece.radius()});
+    body.pieces.push_back({known->second, pose, piece.radius()});
   }
   return body;
 }
@@ -89,42 +90,44 @@ void EncodePose(const Pose& pose, v1::Pose* message) {
 }  // namespace
 
 UnaryReactor* BodyService::PutBody(CallContext* context, const Bytes* request, Bytes* response) {
-  return PutCall::Start(*context, admission_, Rpc::kPutBody, {request, response},
+  return PutCall::Start(context, parts_.admission, Rpc::kPutBody, request, response,
                         [this](PutCall* call) {
-                          readers_.Submit([this, call] { Put(call); }, call->call().client());
+                          parts_.readers.Submit([this, call] { Put(call); }, call->call().client());
                         });
 }
 
 UnaryReactor* BodyService::GetBody(CallContext* context, const Bytes* request, Bytes* response) {
-  return GetCall::Start(*context, admission_, Rpc::kGetBody, {request, response},
+  return GetCall::Start(context, parts_.admission, Rpc::kGetBody, request, response,
                         [this](GetCall* call) {
                           const auto get = [this, call](std::chrono::nanoseconds staleness) {
                             return Get(call->request(), call->call(), staleness, &call->response());
                           };
-                          EndFresh(registry_, readers_, call, get, false);
+                          EndFresh(parts_.registry, parts_.readers, call, get, false);
                         });
 }
 
 UnaryReactor* BodyService::ListBodies(CallContext* context, const Bytes* request, Bytes* response) {
-  return ListCall::Start(
-      *context, admission_, Rpc::kListBodies, {request, response}, [this](ListCall* call) {
-        EndListed(registry_, readers_, call, Rpc::kListBodies, {.bodies = true}, AddListed);
-      });
+  return ListCall::Start(context, parts_.admission, Rpc::kListBodies, request, response,
+                         [this](ListCall* call) {
+                           EndListed(parts_.registry, parts_.readers, call, Rpc::kListBodies,
+                                     {.bodies = true}, AddListed);
+                         });
 }
 
 UnaryReactor* BodyService::DeleteBody(CallContext* context, const Bytes* request, Bytes* response) {
-  return DeleteCall::Start(
-      *context, admission_, Rpc::kDeleteBody, {request, response}, [this](DeleteCall* call) {
-        EndDeleted(registry_, call, registry_.bodies(), "body", call->request().body_id());
-      });
+  return DeleteCall::Start(context, parts_.admission, Rpc::kDeleteBody, request, response,
+                           [this](DeleteCall* call) {
+                             EndDeleted(parts_.registry, call, parts_.registry.bodies(), "body",
+                                        call->request().body_id());
+                           });
 }
 
 void BodyService::Put(PutCall* call) {
   if (call->call().ShouldStop()) return call->End(call->call().StopStatus());
-  absl::StatusOr<StoredBody> body =
-      DecodeBody(call->request(), call->call().caller(), registry_.limits().max_pieces_per_body);
+  absl::StatusOr<StoredBody> body = DecodeBody(call->request(), call->call().caller(),
+                                               parts_.registry.limits().max_pieces_per_body);
   if (!body.ok()) return call->End(body.status());
-  registry_.bodies().Put(
+  parts_.registry.bodies().Put(
       *std::move(body), IfRevision(call->request()),
       [this, call](const absl::StatusOr<PutBodyResult>& result) {
         if (!result.ok()) return call->End(result.status());
@@ -132,14 +135,14 @@ void BodyService::Put(PutCall* call) {
         call->call().LogChange(result->created ? "body created" : "body replaced",
                                {"body", record.body_id}, record.revision);
         v1::PutBodyResponse& response = call->response();
-        EncodeHeader(registry_.store(), result->store_revision, response.mutable_header());
+        EncodeHeader(parts_.store, result->store_revision, response.mutable_header());
         v1::BodyInfo* const info = response.mutable_body();
         info->set_body_id(record.body_id);
         info->set_create_revision(record.create_revision);
         info->set_revision(record.revision);
         info->set_piece_count(result->piece_count);
         response.set_created(result->created);
-        response.set_durability(EncodeDurability(registry_.store().durability()));
+        response.set_durability(EncodeDurability(parts_.store.durability()));
         call->End(absl::OkStatus());
       });
 }
@@ -149,14 +152,13 @@ absl::Status BodyService::Get(const v1::GetBodyRequest& request, const Call& cal
   const std::string& id = request.body_id();
   HULLD_RETURN_IF_ERROR(CheckHullId(call.caller(), id, "body_id"));
   const FoundBodies found =
-      registry_.bodies().Find(std::span(&id, 1), [&call] { return call.ShouldStop(); });
+      parts_.registry.bodies().Find(std::span(&id, 1), [&call] { return call.ShouldStop(); });
   if (!found.status.ok()) return found.status;
   const std::shared_ptr<const Body>& body = found.bodies.front();
   if (body == nullptr) return BodyNotFound(id);
   if (!body->damage().ok()) return body->damage();
   HULLD_RETURN_IF_ERROR(CheckPiecePrefix(*body, call.caller().prefix));
-  EncodeHeader(registry_.store(), AsOf{found.store_revision, staleness},
-               response->mutable_header());
+  EncodeHeader(parts_.store, AsOf{found.store_revision, staleness}, response->mutable_header());
   EncodeBody(body->Describe(), response->mutable_body());
   response->mutable_pieces()->Reserve(static_cast<int>(body->pieces().size()));
   for (const StoredPiece& piece : body->pieces()) {

@@ -7,11 +7,9 @@
 #include <chrono>
 
 #include "hulld/v1/body.grpc.pb.h"
-#include "server/call/admission.h"
 #include "server/call/call.h"
+#include "server/call/service_parts.h"
 #include "server/call/unary_call.h"
-#include "server/process/task_pool.h"
-#include "server/registry/registry.h"
 
 namespace hulld::server {
 
@@ -25,8 +23,7 @@ using BodyServiceOfBytes =
 // records are answered on arrival. Calls that involve pieces, possibly many, run on `readers`.
 class BodyService : public BodyServiceOfBytes {
  public:
-  BodyService(Registry& registry, Admission& admission, TaskPool& readers)
-      : registry_(registry), admission_(admission), readers_(readers) {}
+  explicit BodyService(const ServiceParts& parts) : parts_(parts) {}
 
   UnaryReactor* PutBody(CallContext* context, const Bytes* request, Bytes* response) override;
   UnaryReactor* GetBody(CallContext* context, const Bytes* request, Bytes* response) override;
@@ -44,9 +41,7 @@ class BodyService : public BodyServiceOfBytes {
   absl::Status Get(const v1::GetBodyRequest& request, const Call& call,
                    std::chrono::nanoseconds staleness, v1::GetBodyResponse* response);
 
-  Registry& registry_;
-  Admission& admission_;
-  TaskPool& readers_;
+  const ServiceParts& parts_;
 };
 
 }  // namespace hulld::server

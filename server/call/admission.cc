@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/base/check.h"
+#include "server/access/guard.h"
 #include "server/contract/error_info.h"
 #include "server/contract/limit_error.h"
 
@@ -38,13 +39,15 @@ Admission::Ticket::~Ticket() {
   if (admission_ != nullptr) admission_->Leave(*this);
 }
 
-Admission::Admission(const Limits& limits, Metrics& metrics)
-    : limits_(limits), metrics_(metrics), request_memory_(limits.request_memory) {
+Admission::Admission(const Limits& limits, Metrics& metrics, ConnectionTable& connections,
+                     const Guard* guard)
+    : limits_(limits),
+      metrics_(metrics),
+      connections_(connections),
+      guard_(guard),
+      request_memory_(limits.request_memory) {
   metrics_.AddGauge("hulld_request_bytes", "Bytes held by requests in flight.",
                     [this] { return static_cast<double>(request_memory_.taken_bytes()); });
-  for (size_t i = 0; i < kRpcCount; ++i) {
-    running_gauges_[i] = &metrics_.RunningCalls(static_cast<Rpc>(i));
-  }
   watchman_ = std::thread([this] { CancelOverdue(); });
 }
 
@@ -61,7 +64,7 @@ Admission::~Admission() {
 Admission::Ticket::Share Admission::ShareOf(const Arrival& arrival, uint64_t connection) const {
   using Share = Ticket::Share;
   if (!IsAnonymous(arrival.rpc)) return Share::kCalls;
-  if (arrival.rpc != Rpc::kHealthWatch || connections_ == nullptr) return Share::kAnonymous;
+  if (arrival.rpc != Rpc::kHealthWatch) return Share::kAnonymous;
   // The peer of a unix socket is a program on this machine, such as a proxy for many clients.
   const bool is_first = connection != 0 && !watching_health_.contains(connection);
   return is_first || !arrival.peer.has_value() ? Share::kFree : Share::kAnonymous;
@@ -130,9 +133,7 @@ absl::StatusOr<Admission::Ticket> Admission::Admit(const Arrival& arrival) {
   const auto known = clients_.find(arrival.client);
   const Ticket::Client before = known == clients_.end() ? Ticket::Client{} : known->second;
   // A call without a token does not protect its connection from eviction.
-  if (IsAnonymous(arrival.rpc) && connections_ != nullptr) {
-    ticket.connection_ = connections_->Find(arrival.peer);
-  }
+  if (IsAnonymous(arrival.rpc)) ticket.connection_ = connections_.Find(arrival.peer);
   ticket.share_ = ShareOf(arrival, ticket.connection_);
   absl::Status room;
   if (ticket.share_ == Ticket::Share::kAnonymous) room = CheckAnonymousRoom(before);
@@ -148,9 +149,9 @@ absl::StatusOr<Admission::Ticket> Admission::Admit(const Arrival& arrival) {
           : &*clients_.emplace(arrival.client, Ticket::Client{.number = ++last_client_}).first;
   ticket.admission_ = this;
   Count(ticket, 1);
-  running_gauges_[static_cast<size_t>(arrival.rpc)]->Increment();
-  if (ticket.share_ == Ticket::Share::kCalls && connections_ != nullptr) {
-    ticket.connection_ = connections_->BeginCall(arrival.peer);
+  metrics_.RunningCalls(arrival.rpc).Increment();
+  if (ticket.share_ == Ticket::Share::kCalls) {
+    ticket.connection_ = connections_.BeginCall(arrival.peer);
   }
   if (ticket.share_ == Ticket::Share::kFree && ticket.connection_ != 0) {
     watching_health_.insert(ticket.connection_);
@@ -178,7 +179,7 @@ void Admission::Count(const Ticket& ticket, uint64_t by) {
   if (ticket.kind_ == CallKind::kStream && !IsAnonymous(ticket.rpc_)) client.streams += by;
 }
 
-size_t Admission::EndRevoked(const std::function<bool(const Caller&)>& is_valid) {
+size_t Admission::EndRevoked() {
   const auto end = std::chrono::steady_clock::now() + kGrace;
   std::vector<std::function<void()>> waiting;
   size_t count = 0;
@@ -186,7 +187,7 @@ size_t Admission::EndRevoked(const std::function<bool(const Caller&)>& is_valid)
     const std::lock_guard lock(mutex_);
     for (Ticket::Watched& call : watched_) {
       const bool is_revocable = !call.caller.name.empty() && !call.lifetime->is_revoked();
-      if (!is_revocable || is_valid(call.caller)) continue;
+      if (!is_revocable || guard_->Knows(call.caller)) continue;
       call.lifetime->Revoke();
       call.end = std::min(call.end, end);
       if (call.on_revoked) waiting.push_back(std::move(call.on_revoked));
@@ -270,11 +271,11 @@ void Admission::Leave(Ticket& ticket) {
     HULLD_CHECK(ticket.client_->second.running > 0);
     Count(ticket, uint64_t{0} - 1);
     if (ticket.share_ == Ticket::Share::kCalls && ticket.connection_ != 0) {
-      connections_->EndCall(ticket.connection_);
+      connections_.EndCall(ticket.connection_);
     }
     if (ticket.share_ == Ticket::Share::kFree) watching_health_.erase(ticket.connection_);
     if (ticket.client_->second.running == 0) clients_.erase(clients_.find(ticket.client_->first));
-    running_gauges_[static_cast<size_t>(ticket.rpc_)]->Decrement();
+    metrics_.RunningCalls(ticket.rpc_).Decrement();
     if (running_ == 0) idle_.notify_all();
   }
   if (watched != nullptr) grpc_call_unref(watched);

@@ -3,9 +3,7 @@
 
 #include <absl/status/statusor.h>
 #include <grpc/grpc.h>
-#include <prometheus/gauge.h>
 
-#include <array>
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
@@ -31,7 +29,7 @@
 
 namespace hulld::server {
 
-class Authenticator;
+class Guard;
 
 // Returns true if a call waits for the writer pool; false if it waits for the reader and answer
 // pools.
@@ -48,14 +46,6 @@ bool UsesWriters(Rpc rpc);
 // no share, because clients open one automatically.
 class Admission {
  public:
-  // Sets the authenticator, which must outlive this object. Without one, all callers have all
-  // permissions. Requires: no call has arrived yet.
-  void SetAuthenticator(const Authenticator& authenticator) { authenticator_ = &authenticator; }
-  const Authenticator* authenticator() const { return authenticator_; }
-  // Sets the table that records connections with calls. The table must outlive this object.
-  // Requires: no call has arrived yet.
-  void SetConnections(ConnectionTable& connections) { connections_ = &connections; }
-
   // An admitted call. The call ends when its ticket is destroyed.
   class Ticket {
    public:
@@ -112,8 +102,10 @@ class Admission {
     std::optional<std::list<Watched>::iterator> watched_;
   };
 
-  // The metrics must outlive this object.
-  Admission(const Limits& limits, Metrics& metrics);
+  // connections: records connections with calls. guard: authenticates callers; without one, they
+  // have all permissions. All must outlive this object.
+  Admission(const Limits& limits, Metrics& metrics, ConnectionTable& connections,
+            const Guard* guard = nullptr);
   Admission(const Admission&) = delete;
   Admission& operator=(const Admission&) = delete;
   // Requires that no call is running.
@@ -124,6 +116,7 @@ class Admission {
   static constexpr uint64_t kFewCalls = 16;
 
   const Limits& limits() const { return limits_; }
+  const Guard* guard() const { return guard_; }
   Metrics& metrics() { return metrics_; }
 
   // Memory of the admitted requests.
@@ -154,10 +147,10 @@ class Admission {
   // named limit is reached.
   absl::StatusOr<Ticket> Admit(const Arrival& arrival);
 
-  // Ends every call with a token that `is_valid` rejects, with UNAUTHENTICATED. Returns the number
-  // of these calls. A call that does not end by itself within two seconds, for example because its
-  // client does not read, is cancelled without error details.
-  size_t EndRevoked(const std::function<bool(const Caller&)>& is_valid);
+  // Ends every call with a token that the guard no longer knows, with UNAUTHENTICATED. Returns the
+  // number of these calls. A call that does not end by itself within two seconds, for example
+  // because its client does not read, is cancelled without error details.
+  size_t EndRevoked();
 
   void BeginDrain();
 
@@ -185,13 +178,10 @@ class Admission {
 
   const Limits limits_;
   Metrics& metrics_;
+  ConnectionTable& connections_;
+  const Guard* const guard_;
   RequestMemory request_memory_;
   std::function<size_t(Rpc)> backlog_;
-
-  const Authenticator* authenticator_ = nullptr;
-  ConnectionTable* connections_ = nullptr;
-  // hulld_requests_running{rpc}.
-  std::array<prometheus::Gauge*, kRpcCount> running_gauges_;
 
   std::mutex mutex_;
   // The mutex guards the members below, and changes of `running_`.

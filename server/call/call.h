@@ -72,7 +72,7 @@ class Call {
 
   // Authenticates and admits the call. After an error, the caller must end the call with it.
   // on_revoked: as in Admission::Arrival. UNAUTHENTICATED, PERMISSION_DENIED: as
-  // Authenticator::Authenticate. UNAVAILABLE: the server is draining. RESOURCE_EXHAUSTED: a limit
+  // Guard::Authenticate. UNAVAILABLE: the server is draining. RESOURCE_EXHAUSTED: a limit
   // on calls is reached.
   absl::Status Begin(std::function<void()> on_revoked = {});
 
@@ -104,8 +104,6 @@ class Call {
  private:
   using Clock = std::chrono::steady_clock;
 
-  // Sets caller_.
-  absl::Status Authenticate();
   // Returns the client charged for the call: the token's name or, without tokens, the peer's
   // network or gRPC's name for the peer of a unix socket.
   std::string Client(const std::optional<PeerAddress>& peer) const;

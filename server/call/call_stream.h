@@ -91,9 +91,6 @@ class CallStream : public Reactor, public std::enable_shared_from_this<CallStrea
   void OnCancel() override { call_.Cancel(); }
   void OnDone() override { self_.reset(); }
 
-  // True if one mutex guards all state shared by threads.
-  static constexpr bool kIsLocked = false;
-
  private:
   // Destroyed last, because its ticket keeps the server alive.
   Call call_;
@@ -162,8 +159,8 @@ class ReadingStream : public Stream {
   static constexpr uint64_t kKeptBytes = 64 << 10;
 
   bool BeginRead() {
-    const auto lock = LockRead();
-    if (!Stream::kIsLocked && this->call().is_revoked()) return false;
+    const std::lock_guard lock(read_mutex_);
+    if (this->call().is_revoked()) return false;
     HULLD_CHECK(!std::exchange(reading_, true) && !this->finished());
     if (share_.bytes() > kKeptBytes) request_ = Request();
     share_.GiveBack();
@@ -172,30 +169,23 @@ class ReadingStream : public Stream {
   }
   // Returns true if a read was in flight.
   bool EndRead() {
-    const auto lock = LockRead();
+    const std::lock_guard lock(read_mutex_);
     return std::exchange(reading_, false);
   }
-  std::unique_lock<std::mutex> LockRead() {
-    return Stream::kIsLocked ? std::unique_lock<std::mutex>() : std::unique_lock(read_mutex_);
-  }
 
+  // A message that gRPC still reads is dropped.
   void OnRevoked() final {
-    if constexpr (Stream::kIsLocked) {
-      Stream::OnRevoked();
-    } else if (EndRead()) {
-      // Nothing else is in flight; a message that gRPC still reads is dropped.
-      this->React([this] { OnNoMessage(absl::OkStatus()); });
-    }
+    Stream::OnRevoked();
+    if (EndRead()) this->React([this] { OnNoMessage(absl::OkStatus()); });
   }
 
   void OnReadDone(bool ok) final {
-    if (!Stream::kIsLocked && !EndRead()) return;
     absl::Status parsed;
     if (ok) {
       parsed = ParseRequest(bytes_, this->call().request_memory(), &request_, share_);
     }
     this->React([this, ok, &parsed] {
-      if constexpr (Stream::kIsLocked) HULLD_CHECK(EndRead());
+      if (!EndRead()) return;
       if (ok && parsed.ok()) {
         OnMessage();
       } else {
@@ -208,7 +198,7 @@ class ReadingStream : public Stream {
   Bytes bytes_;
   RequestMemory::Share share_;
   Request request_;
-  // Guards `reading_` if the stream has no mutex: a revocation ends a read from another thread.
+  // Guards `reading_`: a revocation ends a read from another thread.
   std::mutex read_mutex_;
   bool reading_ = false;
 };

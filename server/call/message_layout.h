@@ -2,6 +2,7 @@
 #define HULLD_SERVER_CALL_MESSAGE_LAYOUT_H_
 
 #include <google/protobuf/descriptor.h>
+#include <google/protobuf/io/coded_stream.h>
 
 #include <cstddef>
 #include <cstdint>
@@ -24,24 +25,25 @@ class MessageLayout {
   uint64_t ParsedBytes(std::string_view message, uint64_t most) const;
 
  private:
+  // A number, a text, or a message; otherwise unknown.
   struct Field {
-    enum class Kind : uint8_t { kUnknown, kNumber, kText, kMessage };
-    Kind kind = Kind::kUnknown;
+    bool is_number() const { return element_bytes > 0; }
+
     bool is_repeated = false;
-    // True if numeric elements are varints on the wire, packed or not.
-    bool is_varint = false;
+    bool is_text = false;
+    // As the contract declares it; lists of numbers are packed or not.
+    uint8_t wire_type = 0;
+    // Bytes of a number in memory.
     uint32_t element_bytes = 0;
     const MessageLayout* message = nullptr;
   };
 
   explicit MessageLayout(const google::protobuf::Descriptor& type);
 
-  class Input;
-
-  void Count(Input& input, uint64_t most, int depth, uint64_t& bytes) const;
-  static bool CountDelimited(Input& input, const Field& field, uint64_t most, int depth,
-                             uint64_t& bytes);
-  const Field& FieldAt(int number) const;
+  void Count(google::protobuf::io::CodedInputStream& input, uint64_t most, int depth,
+             uint64_t& bytes) const;
+  static bool CountDelimited(google::protobuf::io::CodedInputStream& input, const Field& field,
+                             uint64_t most, int depth, uint64_t& bytes);
 
   // Indexed by field number; gaps are unknown fields.
   std::vector<Field> fields_;

@@ -4,13 +4,11 @@
 #include <absl/status/status.h>
 #include <grpcpp/grpcpp.h>
 
-#include <atomic>
 #include <chrono>
 #include <cstddef>
 #include <deque>
 #include <mutex>
 #include <optional>
-#include <thread>
 #include <utility>
 
 #include "server/call/call_stream.h"
@@ -33,10 +31,8 @@ class QueuedStream : public CallStream<Reactor> {
   void Locked(Step&& step) {
     const auto self = this->shared_from_this();
     const std::lock_guard lock(mutex_);
-    holder_ = std::this_thread::get_id();
     step();
     Proceed();
-    holder_ = std::thread::id();
   }
 
   template <typename Step>
@@ -44,7 +40,9 @@ class QueuedStream : public CallStream<Reactor> {
     Locked(std::forward<Step>(step));
   }
 
-  static constexpr bool kIsLocked = true;
+  void Open() override {
+    Locked([] {});
+  }
   void OnRevoked() override {
     Locked([this] { Abandon(); });
   }
@@ -53,61 +51,43 @@ class QueuedStream : public CallStream<Reactor> {
 
   // Starts work (reads or tasks) as the state permits. Called after each Locked step until an end
   // is set. May queue replies and set the end.
-  virtual void StartWork() = 0;
+  virtual void StartWork() {}
   // Returns true if work is in flight that must finish before the stream ends.
-  virtual bool IsWorking() const = 0;
+  virtual bool IsWorking() const { return false; }
   // Returns true if the only queued reply must wait to be merged with later ones, which saves
   // writes. In that case, a Locked step must follow soon.
-  virtual bool KeepsWaiting() const { return false; }
+  virtual bool KeepsWaiting() { return false; }
 
   // Queues a reply. bytes: its size, if the stream bounds its queue.
   void Queue(Reply reply, size_t bytes = 0) {
-    CheckLocked();
     unsent_bytes_ += bytes;
     waiting_.push_back({std::move(reply), bytes, std::chrono::steady_clock::now()});
   }
+  struct Waiting {
+    Reply reply;
+    size_t bytes;
+    std::chrono::steady_clock::time_point since;
+  };
   // The last queued reply, for merging more into it; null if the queue is empty.
-  Reply* LastWaiting() { return waiting_.empty() ? nullptr : &waiting_.back().reply; }
-  size_t LastWaitingBytes() const { return waiting_.empty() ? 0 : waiting_.back().bytes; }
+  Waiting* LastWaiting() { return waiting_.empty() ? nullptr : &waiting_.back(); }
   // Adds to the size of the last queued reply.
   void GrowLastWaiting(size_t bytes) {
     HULLD_CHECK(!waiting_.empty());
     waiting_.back().bytes += bytes;
     unsent_bytes_ += bytes;
   }
-  // Time since the last queued reply was queued.
-  std::chrono::steady_clock::duration LastWaitingTime() const {
-    return std::chrono::steady_clock::now() - waiting_.back().since;
-  }
-  void DropWaiting() {
-    CheckLocked();
-    for (const Waiting& dropped : waiting_) unsent_bytes_ -= dropped.bytes;
-    waiting_.clear();
-  }
   // Total size of the queued replies and of the one being written.
   size_t unsent_bytes() const { return unsent_bytes_; }
 
   // Sets the end unless one is set.
   void End(const absl::Status& status) {
-    CheckLocked();
     if (!end_.has_value()) end_ = status;
   }
   // Replaces the end with a more specific one.
-  void OverrideEnd(const absl::Status& status) {
-    CheckLocked();
-    end_ = status;
-  }
+  void OverrideEnd(const absl::Status& status) { end_ = status; }
   const std::optional<absl::Status>& end() const { return end_; }
 
  private:
-  struct Waiting {
-    Reply reply;
-    size_t bytes;
-    std::chrono::steady_clock::time_point since;
-  };
-
-  void CheckLocked() const { HULLD_DCHECK(holder_ == std::this_thread::get_id()); }
-
   void OnWriteDone(bool ok) final {
     Locked([this, ok] {
       HULLD_CHECK(std::exchange(writing_, false));
@@ -124,7 +104,8 @@ class QueuedStream : public CallStream<Reactor> {
   // Ends the call: the client stopped reading or was revoked.
   void Abandon() {
     this->call().Cancel();
-    DropWaiting();
+    for (const Waiting& dropped : waiting_) unsent_bytes_ -= dropped.bytes;
+    waiting_.clear();
     End(this->call().StopStatus());
   }
 
@@ -143,7 +124,6 @@ class QueuedStream : public CallStream<Reactor> {
   }
 
   std::mutex mutex_;
-  std::atomic<std::thread::id> holder_ = std::thread::id();
   // The mutex guards the members below.
   std::deque<Waiting> waiting_;
   // The serialized reply in flight, and the size with which it was queued.

@@ -13,26 +13,21 @@
 
 namespace hulld::server {
 
-// Request of a unary call, and the buffer of its response, held by gRPC until the call ends.
-struct UnaryBytes {
-  const Bytes* request;
-  Bytes* response;
-};
-
 // A unary call, answered on any thread. Owns itself until gRPC releases it.
 template <typename Request, typename Response>
 class UnaryCall : public UnaryReactor {
  public:
   // Admits a call, parses its request, and passes it to `start`, which must ensure that End is
-  // called exactly once, now or later. A refused or malformed call ends immediately.
+  // called exactly once, now or later. A refused or malformed call ends immediately. request,
+  // response: held by gRPC until the call ends.
   template <typename Step>
-  static UnaryReactor* Start(CallContext& context, Admission& admission, Rpc rpc,
-                             const UnaryBytes& bytes, Step&& start) {
-    auto* call = new UnaryCall(context, admission, rpc, bytes.response);
+  static UnaryReactor* Start(CallContext* context, Admission& admission, Rpc rpc,
+                             const Bytes* request, Bytes* response, Step&& start) {
+    auto* call = new UnaryCall(*context, admission, rpc, response);
     absl::Status begun = call->call_.Begin();
     if (begun.ok()) {
-      Bytes request = TakenFrom(*bytes.request);
-      begun = ParseRequest(request, admission.request_memory(), &call->request_, call->share_);
+      Bytes bytes = TakenFrom(*request);
+      begun = ParseRequest(bytes, admission.request_memory(), &call->request_, call->share_);
     }
     if (begun.ok()) {
       start(call);

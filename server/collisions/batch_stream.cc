@@ -20,36 +20,23 @@ constexpr uint64_t kPairsPerPoll = 64;
 
 }  // namespace
 
-BatchStream::BatchStream(CallContext& context, const CollisionParts& parts, const Bytes& request)
+BatchStream::BatchStream(CallContext& context, const ServiceParts& parts, const Bytes& request)
     : PiecedReplies(request, context, Rpc::kBatchCheckCollisions, parts,
                     {.first_units = kFirstPairs,
                      .max_units = kMaxPairs,
                      .max_short_placements = kMaxPlacementsPerSlice,
-                     .joins_head = true}) {}
+                     .joins_head = true,
+                     .steps_per_look = kPairsPerPoll}) {}
 
 absl::Status BatchStream::Validate() {
   HULLD_RETURN_IF_ERROR(DecodePlacements(request().method(), "the batch"));
   expected_pairs_ = CountUnits();
   // Each placement is used at most twice on average, so placing it again costs less than memory for
   // all of them.
-  const bool is_textbook = query_.method == Method::kTextbookSat;
-  if (!is_textbook && expected_pairs_ <= table_.size()) table_.PlaceOnDemand();
+  if (!IsTextbook() && expected_pairs_ <= table_.size()) table_.PlaceOnDemand();
   call().AddPairs(expected_pairs_);
   return ValidatePairs(request().pairs(), table_.size(), registry().limits().max_pairs_per_batch,
                        "the batch");
-}
-
-absl::Status BatchStream::Prepare() {
-  is_plain_ = AsksRelationsOfHulls(query_, table_);
-  return absl::OkStatus();
-}
-
-// A textbook pair holds memory once started, so a batch starts only one.
-bool BatchStream::MayRunAhead() const { return query_.method != Method::kTextbookSat; }
-
-uint64_t BatchStream::StepsPerLook() const {
-  const bool is_textbook = query_.method == Method::kTextbookSat;
-  return is_textbook || table_.has_bodies() || table_.has_motions() ? 1 : kPairsPerPoll;
 }
 
 void BatchStream::EndPair(PairsPiece& piece, size_t bytes) {
@@ -67,7 +54,7 @@ absl::Status BatchStream::Step(PairsPiece& piece, Clock::time_point end) {
     EndPair(piece, AddUnansweredPair(table_, wanted, columns));
     return absl::OkStatus();
   }
-  if (is_plain_) return AnswerRelation(a, b, piece);
+  if (AsksRelationsOfHulls(query_, table_)) return AnswerRelation(a, b, piece);
   if (!piece.search.has_value()) {
     piece.search.emplace(table_, a, b, query_, motion_options_);
     HULLD_RETURN_IF_ERROR(piece.search->CheckMemory(registry()));
@@ -99,16 +86,6 @@ absl::Status BatchStream::AnswerRelation(uint32_t a, uint32_t b, PairsPiece& pie
   piece.rungs.Add(answer->rung);
   EndPair(piece, AddRelation(*answer, piece.rows.mutable_columns()));
   return absl::OkStatus();
-}
-
-bool BatchStream::Join(const v1::BatchCheckCollisionsResponse& reply,
-                       v1::BatchCheckCollisionsResponse* waiting) {
-  const bool is_head = waiting->columns().relations().empty();
-  if (!is_head && NamesRows(reply.columns())) return false;
-  const uint64_t first_pair = waiting->first_pair();
-  waiting->MergeFrom(reply);
-  waiting->set_first_pair(first_pair);
-  return true;
 }
 
 }  // namespace hulld::server

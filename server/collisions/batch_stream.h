@@ -28,29 +28,20 @@ struct PairsPiece : Piece<v1::BatchCheckCollisionsResponse> {
 class BatchStream : public PiecedReplies<v1::BatchCheckCollisionsRequest,
                                          v1::BatchCheckCollisionsResponse, PairsPiece> {
  public:
-  BatchStream(CallContext& context, const CollisionParts& parts, const Bytes& request);
+  BatchStream(CallContext& context, const ServiceParts& parts, const Bytes& request);
 
  private:
   absl::Status Validate() override;
-  absl::Status Prepare() override;
   // Answers the next pair of the piece, or works on it until `end`. CANCELLED. RESOURCE_EXHAUSTED:
   // as PairSearch::CheckMemory.
   absl::Status Step(PairsPiece& piece, Clock::time_point end) override;
-  uint64_t StepsPerLook() const override;
-  // The functions below require the mutex.
+  // Requires the mutex.
   uint64_t CountUnits() override { return static_cast<uint64_t>(request().pairs_size()) / 2; }
-  bool MayRunAhead() const override;
-  bool Join(const v1::BatchCheckCollisionsResponse& reply,
-            v1::BatchCheckCollisionsResponse* waiting) override;
 
   // Called without the mutex.
   absl::Status AnswerRelation(uint32_t a, uint32_t b, PairsPiece& piece);
   // Ends the row of the next pair.
   void EndPair(PairsPiece& piece, size_t bytes);
-
-  // True if all pairs are of hulls at rest and only relations are wanted (AnswerRelation). Written
-  // before the first piece.
-  bool is_plain_ = false;
 };
 
 }  // namespace hulld::server

@@ -12,7 +12,7 @@ namespace hulld::server {
 
 UnaryReactor* CollisionService::CheckCollision(CallContext* context, const Bytes* request,
                                                Bytes* response) {
-  return CheckCall::Start(*context, parts_.admission, Rpc::kCheckCollision, {request, response},
+  return CheckCall::Start(context, parts_.admission, Rpc::kCheckCollision, request, response,
                           [this](CheckCall* call) { PairQuestion::Start(parts_, call); });
 }
 

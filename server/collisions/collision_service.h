@@ -6,12 +6,8 @@
 #include <cstddef>
 
 #include "hulld/v1/collision.grpc.pb.h"
-#include "server/call/admission.h"
 #include "server/call/call_stream.h"
-#include "server/collisions/placed/collision_parts.h"
-#include "server/process/task_pool.h"
-#include "server/registry/registry.h"
-#include "server/registry/waiting_calls.h"
+#include "server/call/service_parts.h"
 
 namespace hulld::server {
 
@@ -32,12 +28,7 @@ using CollisionServiceOfBytes = v1::CollisionService::WithRawCallbackMethod_Chec
 // other calls.
 class CollisionService : public CollisionServiceOfBytes {
  public:
-  CollisionService(Registry& registry, Admission& admission, TaskPool& readers,
-                   TaskPool& long_readers, TaskPool& pool)
-      : parts_{registry, admission, readers, long_readers, pool, waiting_} {}
-
-  // Number of calls that wait for the store without occupying a thread.
-  size_t waiting() const { return waiting_.count(); }
+  explicit CollisionService(const ServiceParts& parts) : parts_(parts) {}
 
   UnaryReactor* CheckCollision(CallContext* context, const Bytes* request,
                                Bytes* response) override;
@@ -47,8 +38,7 @@ class CollisionService : public CollisionServiceOfBytes {
   BidiReactor* WatchCollisions(CallContext* context) override;
 
  private:
-  WaitingCalls waiting_;
-  const CollisionParts parts_;
+  const ServiceParts& parts_;
 };
 
 }  // namespace hulld::server

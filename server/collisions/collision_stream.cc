@@ -107,7 +107,7 @@ void CollisionStream::AnswerMessage(absl::Status status) {
   if (!status.ok()) return FinishCall(OrStopped(status));
   request().Clear();
   pairs_.SortSelected();
-  table_.EncodeHeader(parts_.registry.store(), reply().mutable_header());
+  table_.EncodeHeader(parts_.store, reply().mutable_header());
   reply_bytes_ = reply().ByteSizeLong();
   call().AddPairs(pairs_.selected().size());
   AnswerSlice();
@@ -120,9 +120,8 @@ absl::Status CollisionStream::OfMessage(const absl::Status& status) const {
 }
 
 absl::Status CollisionStream::HandleMessage() {
-  const absl::Status in_order = CheckOrder(
-      request(), open_, "open was sent twice; start a new stream for other placements or pairs");
-  if (!in_order.ok()) return in_order;
+  HULLD_RETURN_IF_ERROR(CheckOrder(
+      request(), open_, "open was sent twice; start a new stream for other placements or pairs"));
   if (request().has_open()) return Prefixed("open: ", HandleOpen());
   ++messages_;
   return OfMessage(HandleUpdate(request().update()));
@@ -130,26 +129,20 @@ absl::Status CollisionStream::HandleMessage() {
 
 absl::Status CollisionStream::HandleOpen() {
   v1::CollisionStreamOpen& open = *request().mutable_open();
-  HULLD_ASSIGN_OR_RETURN(QueryOptions options,
+  HULLD_ASSIGN_OR_RETURN(options_,
                          MakeQueryOptions(v1::METHOD_UNSPECIFIED, open.wanted(), open.tolerance(),
                                           parts_.registry.limits(), call().lifetime()));
-  HULLD_ASSIGN_OR_RETURN(freshness_, DecodeFreshness(open.freshness(), parts_.registry.store(),
-                                                     call().message_arrival()));
-  const absl::Status resting =
-      RefuseMotions(open.placements(), open.packed_placements(), "a stream");
-  if (!resting.ok()) return resting;
+  HULLD_ASSIGN_OR_RETURN(freshness_,
+                         DecodeFreshness(open.freshness(), parts_.store, call().message_arrival()));
+  HULLD_RETURN_IF_ERROR(RefuseMotions(open.placements(), open.packed_placements(), "a stream"));
   HULLD_ASSIGN_OR_RETURN(
-      PlacementTable table,
+      table_,
       PlacementTable::Make(open.placements(), *open.mutable_packed_placements(), call().caller(),
                            parts_.registry.limits().max_placements, "the stream"));
-  const absl::Status valid = ValidatePairs(
-      open.pairs(), table.size(), parts_.registry.limits().max_pairs_per_batch, "the stream");
-  if (!valid.ok()) return valid;
-  options_ = std::move(options);
+  HULLD_RETURN_IF_ERROR(ValidatePairs(open.pairs(), table_.size(),
+                                      parts_.registry.limits().max_pairs_per_batch, "the stream"));
   wanted_ = open.wanted();
   only_changes_ = open.only_changes();
-  table_ = std::move(table);
-
   HULLD_RETURN_IF_ERROR(ChargeFor(static_cast<size_t>(open.pairs_size()) / 2));
   pairs_ = LivePairs(open.pairs(), table_.size(), v1::RELATION_UNSPECIFIED);
   open_ = true;
@@ -300,7 +293,7 @@ void CollisionStream::AnswerSlice() {
     if (next_row_ < table_.table_rows()) return SendPart(false);
     reply_bytes_ = reply().ByteSizeLong();
   }
-  const bool is_plain = IsPlain();
+  const bool is_plain = AsksRelationsOfHulls(options_, table_);
   const std::span<const uint32_t> asked = pairs_.selected();
   if (is_plain && decided_.size() < asked.size()) return DecideTogether();
   const auto end = std::chrono::steady_clock::now() + TaskPool::kSliceTime;
@@ -314,10 +307,6 @@ void CollisionStream::AnswerSlice() {
       return RunOn(lane_, [this] { AnswerSlice(); });
     }
   }
-  SendAnswered();
-}
-
-void CollisionStream::SendAnswered() {
   call().metrics().CountPairs(std::exchange(rungs_, {}));
   if (call().ShouldStop()) return FinishCall(call().StopStatus());
   const bool is_last = next_asked_ == pairs_.selected().size();

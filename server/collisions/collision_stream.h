@@ -13,8 +13,8 @@
 #include "core/query/collision.h"
 #include "hulld/v1/collision.pb.h"
 #include "server/call/pulled_stream.h"
+#include "server/call/service_parts.h"
 #include "server/collisions/claimed_range.h"
-#include "server/collisions/placed/collision_parts.h"
 #include "server/collisions/placed/live_pairs.h"
 #include "server/collisions/placed/placement_table.h"
 #include "server/collisions/placed/query_settings.h"
@@ -32,7 +32,7 @@ class CollisionStream
     : public ReadingStream<PulledStream<BidiReactor, v1::StreamCollisionsResponse>,
                            v1::StreamCollisionsRequest> {
  public:
-  CollisionStream(CallContext& context, const CollisionParts& parts)
+  CollisionStream(CallContext& context, const ServiceParts& parts)
       : ReadingStream(context, parts.admission, Rpc::kStreamCollisions),
         parts_(parts),
         lane_(parts.pool),
@@ -54,7 +54,6 @@ class CollisionStream
   void OnSent() override;
 
   bool IsQuick() const;
-  bool IsPlain() const { return AsksRelationsOfHulls(options_, table_); }
   void Handle();
   absl::Status HandleMessage();
   absl::Status OfMessage(const absl::Status& status) const;
@@ -69,10 +68,9 @@ class CollisionStream
   void Decide(uint32_t i);
   void AddDecided(size_t i);
   void AnswerSlice();
-  void SendAnswered();
   void SendPart(bool last);
 
-  const CollisionParts& parts_;
+  const ServiceParts& parts_;
   // Slices of long answers.
   TaskPool::Lane lane_;
   // Covers placements and pairs.

@@ -46,7 +46,7 @@ absl::Status EncodeAnswer(const hulld::Answer& answer, const QueryHull& a, const
 
 }  // namespace
 
-void PairQuestion::Start(const CollisionParts& parts, CheckCall* call) {
+void PairQuestion::Start(const ServiceParts& parts, CheckCall* call) {
   parts.pool.NoteSingleCall();
   const std::shared_ptr<PairQuestion> question(new PairQuestion(parts, call));
   if (absl::Status s = question->ReadRequest(); !s.ok()) return call->End(s);
@@ -84,9 +84,8 @@ absl::Status PairQuestion::ReadRequest() {
     HULLD_RETURN_IF_ERROR(ValidateForMotions(options_));
     motion_options_ = MakeMotionOptions(request.wanted(), options_);
   }
-  HULLD_ASSIGN_OR_RETURN(
-      const Freshness freshness,
-      DecodeFreshness(request.freshness(), parts_.registry.store(), call.arrival()));
+  HULLD_ASSIGN_OR_RETURN(const Freshness freshness,
+                         DecodeFreshness(request.freshness(), parts_.store, call.arrival()));
   plan_.freshness = freshness;
   return absl::OkStatus();
 }
@@ -112,7 +111,10 @@ void PairQuestion::AnswerResolved() {
   if (absl::Status s = Begin(); !s.ok()) return call_->End(s);
   // Answers to a client with many calls take turns in the pool, because gRPC's threads process
   // calls in the order of arrival.
-  if (IsQuick() && !call_->call().is_one_of_many()) return RunSlice();
+  const bool is_quick = AsksRelationsOfHulls(options_, table_) &&
+                        IsQuickToRelate(table_.HullAt(kA)) && IsQuickToRelate(table_.HullAt(kB)) &&
+                        !call_->call().is_one_of_many();
+  if (is_quick) return RunSlice();
   parts_.pool.Submit([self = shared_from_this()] { self->RunSlice(); }, call_->call().client());
 }
 
@@ -121,17 +123,11 @@ absl::Status PairQuestion::Begin() {
     if (!table_.is_answerable(i)) return table_.problem(i);
   }
   v1::CheckCollisionResponse& response = call_->response();
-  table_.EncodeHeader(parts_.registry.store(), response.mutable_header());
+  table_.EncodeHeader(parts_.store, response.mutable_header());
   table_.EncodeHull(*table_.hull_of(kA), response.mutable_hull_a());
   table_.EncodeHull(*table_.hull_of(kB), response.mutable_hull_b());
   search_.emplace(table_, kA, kB, options_, motion_options_);
   return search_->CheckMemory(parts_.registry);
-}
-
-// Returns true if the answer may be computed on a gRPC thread.
-bool PairQuestion::IsQuick() const {
-  return AsksRelationsOfHulls(options_, table_) && IsQuickToRelate(table_.HullAt(kA)) &&
-         IsQuickToRelate(table_.HullAt(kB));
 }
 
 void PairQuestion::RunSlice() {
@@ -178,7 +174,7 @@ absl::Status PairQuestion::EncodeProof() {
   const auto encode = [&](const HullView& hull) {
     const std::string& id = hull.record.hull_id;
     if (id.empty() || !known.insert(id).second) return;
-    EncodeVersion(parts_.registry.store(), hull.record, response.add_piece_hulls());
+    EncodeVersion(parts_.store, hull.record, response.add_piece_hulls());
   };
   for (const uint32_t i : {kA, kB}) {
     const HullView& view = *table_.hull(*table_.hull_of(i));

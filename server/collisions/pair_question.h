@@ -9,8 +9,8 @@
 #include "core/query/motion/first_contact.h"
 #include "core/query/terms/query_options.h"
 #include "hulld/v1/collision.pb.h"
+#include "server/call/service_parts.h"
 #include "server/call/unary_call.h"
-#include "server/collisions/placed/collision_parts.h"
 #include "server/collisions/placed/placed_answer.h"
 #include "server/collisions/placed/placement_table.h"
 #include "server/process/task_pool.h"
@@ -24,10 +24,10 @@ using CheckCall = UnaryCall<v1::CheckCollisionRequest, v1::CheckCollisionRespons
 class PairQuestion : public std::enable_shared_from_this<PairQuestion> {
  public:
   // Answers the call, which must be admitted.
-  static void Start(const CollisionParts& parts, CheckCall* call);
+  static void Start(const ServiceParts& parts, CheckCall* call);
 
  private:
-  PairQuestion(const CollisionParts& parts, CheckCall* call)
+  PairQuestion(const ServiceParts& parts, CheckCall* call)
       : parts_(parts), call_(call), charge_(parts.registry.memory(), MemoryUse::kReading) {}
 
   // Reads everything except the hulls.
@@ -42,13 +42,12 @@ class PairQuestion : public std::enable_shared_from_this<PairQuestion> {
   // the pool, with the first slice ahead of those of batches.
   void AnswerResolved();
   absl::Status Begin();
-  bool IsQuick() const;
   void RunSlice();
   // Fills the response.
   absl::Status Encode();
   absl::Status EncodeProof();
 
-  const CollisionParts& parts_;
+  const ServiceParts& parts_;
   CheckCall* const call_;
   QueryOptions options_;
   // Used if a placement moves.

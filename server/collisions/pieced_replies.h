@@ -18,7 +18,7 @@
 #include "core/base/check.h"
 #include "core/base/status_macros.h"
 #include "server/call/queued_stream.h"
-#include "server/collisions/placed/collision_parts.h"
+#include "server/call/service_parts.h"
 #include "server/collisions/placed/placement_table.h"
 #include "server/collisions/placed/query_settings.h"
 #include "server/process/shared_loop.h"
@@ -38,9 +38,8 @@ struct Piece {
   // The remaining range.
   uint64_t next = 0;
   uint64_t end = 0;
-  std::vector<Reply> replies = {};
-  // Size of each reply, and their total.
-  std::vector<size_t> reply_bytes = {};
+  // Replies with their sizes, and the total size.
+  std::vector<std::pair<Reply, size_t>> replies = {};
   size_t bytes = 0;
   // Rows of the next reply, and an upper estimate of their bytes.
   Reply rows = {};
@@ -62,8 +61,7 @@ struct Piece {
     if (row_bytes == 0) return;
     const size_t size = rows.ByteSizeLong();
     bytes += size;
-    reply_bytes.push_back(size);
-    replies.push_back(std::exchange(rows, {}));
+    replies.emplace_back(std::exchange(rows, {}), size);
     row_bytes = 0;
   }
 };
@@ -104,11 +102,14 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     int max_short_placements;
     // True if the first answers may join the last message of the head.
     bool joins_head;
+    // Steps between two reads of the clock, for pairs of hulls at rest.
+    uint64_t steps_per_look;
   };
 
-  PiecedReplies(const Bytes& request, CallContext& context, Rpc rpc, const CollisionParts& parts,
+  PiecedReplies(const Bytes& request, CallContext& context, Rpc rpc, const ServiceParts& parts,
                 const Shape& shape)
       : Base(request, context, parts.admission, rpc),
+        steps_per_look_(shape.steps_per_look),
         parts_(parts),
         lane_(parts.pool),
         max_pieces_(2 * parts.pool.threads()),
@@ -130,8 +131,8 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     const Request& request = this->request();
     HULLD_ASSIGN_OR_RETURN(query_, MakeQueryOptions(method, request.wanted(), request.tolerance(),
                                                     registry().limits(), this->call().lifetime()));
-    HULLD_ASSIGN_OR_RETURN(freshness_, DecodeFreshness(request.freshness(), registry().store(),
-                                                       this->call().arrival()));
+    HULLD_ASSIGN_OR_RETURN(
+        freshness_, DecodeFreshness(request.freshness(), parts_.store, this->call().arrival()));
     HULLD_ASSIGN_OR_RETURN(
         table_,
         PlacementTable::Make(request.placements(), *this->own_request().mutable_packed_placements(),
@@ -143,6 +144,7 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   }
 
   Registry& registry() { return parts_.registry; }
+  bool IsTextbook() const { return query_.method == Method::kTextbookSat; }
 
   // Runs `work` on disjoint ranges that cover [0, count), on several threads concurrently for a
   // long call. Used by the steps above.
@@ -155,8 +157,6 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   // at most: adds rows, counts rungs, and advances `next` when the unit is done. Called without the
   // mutex, on any thread, but never concurrently for the same piece.
   virtual absl::Status Step(Work& piece, Clock::time_point end) = 0;
-  // Steps between two reads of the clock.
-  virtual uint64_t StepsPerLook() const = 0;
 
   // Ends a row of the piece. bytes: as returned by AddAnswer.
   void EndRow(Work& piece, size_t bytes) {
@@ -168,35 +168,34 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
 
   // Number of units. Requires that the call is prepared.
   virtual uint64_t CountUnits() = 0;
-  // Returns true if a slice of a piece may start while earlier pieces are in flight.
-  virtual bool MayRunAhead() const { return true; }
   // Queues the replies of the front piece, in order. Called one last time when the piece is done.
   virtual void Deliver(Work& piece) {
-    for (size_t i = 0; i < piece.replies.size(); ++i) {
-      QueueOrJoin(std::move(piece.replies[i]), piece.reply_bytes[i]);
+    for (auto& [reply, bytes] : piece.replies) {
+      QueueOrJoin(std::move(reply), bytes);
       holds_head_ = false;
     }
     piece.replies.clear();
-    piece.reply_bytes.clear();
     piece.bytes = 0;
   }
-  // Merges a small reply into the queued one; returns false if they do not fit.
-  virtual bool Join(const Reply& reply, Reply* waiting) = 0;
   // Called after all pieces are delivered. Returns the number of further units, which exist only
   // from then on; 0 if there are none.
   virtual uint64_t CountFollowingUnits() { return 0; }
   // Called when no units are left, to queue a final message; the end is set afterwards.
   virtual void OnAllDelivered() {}
 
+  // Queues a reply, or merges it into the last queued one if both are small and fit together.
   void QueueOrJoin(Reply reply, size_t bytes) {
-    const bool is_small =
-        bytes <= kSmallReplyBytes && this->LastWaitingBytes() + bytes <= Config::kReplyMessageBytes;
-    Reply* const waiting = this->LastWaiting();
-    if (is_small && waiting != nullptr && Join(reply, waiting)) {
-      this->GrowLastWaiting(bytes);
-    } else {
-      this->Queue(std::move(reply), bytes);
-    }
+    auto* const waiting = this->LastWaiting();
+    const bool is_small = waiting != nullptr && bytes <= kSmallReplyBytes &&
+                          waiting->bytes + bytes <= Config::kReplyMessageBytes;
+    if (!is_small) return this->Queue(std::move(reply), bytes);
+    const bool is_head = waiting->reply.columns().relations().empty();
+    const bool fits = is_head ? shape_.joins_head : !NamesRows(reply.columns());
+    if (!fits) return this->Queue(std::move(reply), bytes);
+    // The merged message keeps its first pair.
+    if constexpr (requires { reply.clear_first_pair(); }) reply.clear_first_pair();
+    waiting->reply.MergeFrom(reply);
+    this->GrowLastWaiting(bytes);
   }
 
   // Written before the first piece.
@@ -206,6 +205,8 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   PlacementTable table_;
   // Minimum number of pairs that the call queries.
   uint64_t expected_pairs_ = 0;
+  // Steps between two reads of the clock. Written while no slice runs.
+  uint64_t steps_per_look_;
 
  private:
   // Returns true if preparation takes at most about a slice, excluding waits.
@@ -214,15 +215,11 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     return listed + this->request().packed_placements().hulls_size() <= shape_.max_short_placements;
   }
 
-  // Runs a short call on the pool first: if its hulls are ready, it need not wait for another
-  // thread.
+  // Opens the call without waiting if its hulls are ready: a short one on the pool, so that it need
+  // not wait for another thread.
   void Open() final {
-    if (IsShort()) return this->RunOn(lane_, [this] { OpenWith(Validate(), false); });
-    this->RunOn(parts_.long_readers, [this] {
-      absl::Status status = Validate();
-      if (status.ok()) status = Charge();
-      if (!status.ok() || !AwaitsFresh()) OpenWith(status, true);
-    });
+    const auto open = [this] { OpenWith(Validate(), false); };
+    IsShort() ? this->RunOn(lane_, open) : this->RunOn(parts_.long_readers, open);
   }
 
   // Returns true if the call waits for the store without occupying a thread. It is then opened
@@ -254,6 +251,8 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     this->Locked([this, &status] {
       opening_ = false;
       if (!status.ok()) return this->End(status);
+      const bool is_slow = table_.has_bodies() || table_.has_motions() || IsTextbook();
+      if (is_slow) steps_per_look_ = 1;
       unit_count_ = CountUnits();
     });
   }
@@ -276,9 +275,8 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
 
   // Works on the piece until `end`, or until it is done.
   absl::Status Advance(Work& piece, Clock::time_point end) {
-    const uint64_t steps = StepsPerLook();
     do {
-      for (uint64_t left = steps; left > 0 && !piece.is_done(); --left) {
+      for (uint64_t left = steps_per_look_; left > 0 && !piece.is_done(); --left) {
         HULLD_RETURN_IF_ERROR(Step(piece, end));
       }
     } while (!piece.is_done() && Clock::now() < end);
@@ -306,17 +304,17 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   bool IsWorking() const final { return opening_ || running_ > 0; }
 
   // The end of the preparation and of each slice is a Locked step.
-  bool KeepsWaiting() const final {
+  bool KeepsWaiting() final {
     if (holds_head_) return opening_ || running_ > 0;
-    return running_ > 0 && this->LastWaitingBytes() <= kSmallReplyBytes &&
-           this->LastWaitingTime() < kMaxWait;
+    return running_ > 0 && this->LastWaiting()->bytes <= kSmallReplyBytes &&
+           Clock::now() - this->LastWaiting()->since < kMaxWait;
   }
 
   // Queues the next message of the table of hulls, which precedes all answers. Returns true if more
   // of the table follows.
   bool QueueHead() {
     Reply head;
-    if (next_row_ == 0) table_.EncodeHeader(registry().store(), head.mutable_header());
+    if (next_row_ == 0) table_.EncodeHeader(parts_.store, head.mutable_header());
     next_row_ = table_.EncodeHulls(next_row_, &head);
     const size_t bytes = head.ByteSizeLong();
     this->Queue(std::move(head), bytes);
@@ -332,22 +330,18 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
       if (!front.is_done()) break;
       pieces_.pop_front();
     }
-    NoteHeldBytes();
+    size_t held_bytes = fixed_bytes_ + this->unsent_bytes();
+    for (const std::unique_ptr<Work>& piece : pieces_) {
+      if (!piece->is_running) piece->noted_bytes = piece->bytes + piece->held_bytes();
+      held_bytes += piece->noted_bytes;
+    }
+    charge_.Set(held_bytes);
     if (is_head_left_) return;
     if (pieces_.empty() && next_unit_ == unit_count_) unit_count_ += CountFollowingUnits();
     if (this->unsent_bytes() < kMaxUnsentBytes) StartSlices();
     if (!pieces_.empty() || next_unit_ < unit_count_) return;
     OnAllDelivered();
     this->End(absl::OkStatus());
-  }
-
-  void NoteHeldBytes() {
-    size_t bytes = fixed_bytes_ + this->unsent_bytes();
-    for (const std::unique_ptr<Work>& piece : pieces_) {
-      if (!piece->is_running) piece->noted_bytes = piece->bytes + piece->held_bytes();
-      bytes += piece->noted_bytes;
-    }
-    charge_.Set(bytes);
   }
 
   void StartSlices() {
@@ -361,7 +355,8 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     for (const std::unique_ptr<Work>& piece : pieces_) {
       if (piece->is_running || piece->is_done()) continue;
       const bool is_front = piece == pieces_.front();
-      if (!is_front && (piece->bytes >= kMaxHeldBytes || !MayRunAhead())) continue;
+      // A textbook pair holds memory once started, so only one is started at a time.
+      if (!is_front && (piece->bytes >= kMaxHeldBytes || IsTextbook())) continue;
       piece->is_running = true;
       ++running_;
       this->RunOn(lane_, [this, each = piece.get()] { RunSlice(*each); });
@@ -378,7 +373,7 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
         static_cast<uint64_t>(std::clamp(wanted, 1.0, static_cast<double>(shape_.max_units)));
   }
 
-  const CollisionParts& parts_;
+  const ServiceParts& parts_;
   TaskPool::Lane lane_;
   const size_t max_pieces_;
   const Shape shape_;

@@ -43,12 +43,13 @@ QueryOptions WithoutDetails(QueryOptions options) {
 
 }  // namespace
 
-SceneStream::SceneStream(CallContext& context, const CollisionParts& parts, const Bytes& request)
+SceneStream::SceneStream(CallContext& context, const ServiceParts& parts, const Bytes& request)
     : PiecedReplies(request, context, Rpc::kFindCollisions, parts,
                     {.first_units = kFirstPlacements,
                      .max_units = kMaxPlacements,
                      .max_short_placements = kMaxBoxesPerSlice,
-                     .joins_head = false}) {}
+                     .joins_head = false,
+                     .steps_per_look = kStepsPerPoll}) {}
 
 absl::Status SceneStream::Validate() {
   HULLD_RETURN_IF_ERROR(DecodePlacements(v1::METHOD_UNSPECIFIED, "the scene"));
@@ -63,35 +64,29 @@ absl::Status SceneStream::Validate() {
 }
 
 absl::Status SceneStream::ValidateChoice() const {
-  if (request().first_only() && request().has_limit()) {
-    return absl::InvalidArgumentError("first_only and limit cannot be combined; omit one of them");
+  const bool has_limit = request().has_limit();
+  const bool moves = table_.has_motions();
+  const v1::Wanted& wanted = request().wanted();
+  const std::pair<bool, const char*> errors[] = {
+      {request().first_only() && has_limit,
+       "first_only and limit cannot be combined; omit one of them"},
+      {request().first_only() && !moves,
+       "first_only orders pairs by their first contact, but no placement has an end_pose; set one, "
+       "or omit first_only"},
+      {request().every_piece() && has_limit,
+       "every_piece and limit cannot be combined; omit one of them"},
+      {request().every_piece() && moves,
+       "every_piece and end_pose cannot be combined; omit one of them, or query the pairs of "
+       "pieces"},
+      {has_limit && request().limit() == 0, "limit is 0; set it to at least 1, or omit it"},
+      {has_limit && !(wanted.separation() && wanted.has_clearance()),
+       "limit orders the pairs within a clearance by separation; set wanted.separation and "
+       "wanted.clearance, which may be infinite"},
+  };
+  for (const auto& [is_wrong, message] : errors) {
+    if (is_wrong) return absl::InvalidArgumentError(message);
   }
-  if (request().first_only() && !table_.has_motions()) {
-    return absl::InvalidArgumentError(
-        "first_only orders pairs by their first contact, but no placement has an end_pose; set "
-        "one, or omit first_only");
-  }
-  if (request().every_piece() && request().has_limit()) {
-    return absl::InvalidArgumentError("every_piece and limit cannot be combined; omit one of them");
-  }
-  if (request().every_piece() && table_.has_motions()) {
-    return absl::InvalidArgumentError(
-        "every_piece and end_pose cannot be combined; omit one of them, or query the pairs of "
-        "pieces");
-  }
-  return request().has_limit() ? ValidateLimit() : absl::OkStatus();
-}
-
-absl::Status SceneStream::ValidateLimit() const {
-  if (request().limit() == 0) {
-    return absl::InvalidArgumentError("limit is 0; set it to at least 1, or omit it");
-  }
-  if (request().wanted().separation() && request().wanted().has_clearance()) {
-    return absl::OkStatus();
-  }
-  return absl::InvalidArgumentError(
-      "limit orders the pairs within a clearance by separation; set wanted.separation and "
-      "wanted.clearance, which may be infinite");
+  return absl::OkStatus();
 }
 
 absl::Status SceneStream::Prepare() {
@@ -110,15 +105,15 @@ absl::Status SceneStream::Prepare() {
     }
   });
   if (call().ShouldStop()) return call().StopStatus();
+  ranked_query_ = query_;
   if (request().has_limit()) {
     ranking_ =
         std::make_unique<RankedPairs>(request().limit(), boxes, query_.max_error.value_or(0));
-    ranked_query_ = std::exchange(query_, WithoutDetails(query_));
+    query_ = WithoutDetails(query_);
   }
   if (request().first_only()) {
     ranking_ =
         std::make_unique<RankedPairs>(MemoryCharge(registry().memory(), MemoryUse::kReading));
-    ranked_motion_ = motion_options_;
     motion_options_.want_certificate = false;
   }
   options_.query = query_;
@@ -134,11 +129,6 @@ size_t SceneStream::HeldBytes() const {
   if (!search_.has_value()) return bytes;
   if (request().has_limit()) bytes += ranking_->MaxMemoryBytes(search_->pairs());
   return bytes + search_->MemoryBytes();
-}
-
-uint64_t SceneStream::StepsPerLook() const {
-  const bool is_quick = ranked_.empty() && !table_.has_bodies() && !table_.has_motions();
-  return is_quick ? kStepsPerPoll : 1;
 }
 
 absl::Status SceneStream::Step(ScenePiece& piece, Clock::time_point /*end*/) {
@@ -170,8 +160,8 @@ absl::Status SceneStream::Step(ScenePiece& piece, Clock::time_point /*end*/) {
 absl::Status SceneStream::AnswerRanked(ScenePiece& piece) {
   const RankedPair& pair = ranked_[piece.next - search_->size()];
   const PlacedAnswer found = request().first_only()
-                                 ? AskFirst(pair.a, pair.b, ranked_motion_)
-                                 : AskPlaced(table_, pair.a, pair.b, ranked_query_, ranked_motion_);
+                                 ? AskFirst(pair.a, pair.b, motion_options_)
+                                 : AskPlaced(table_, pair.a, pair.b, query_, motion_options_);
   if (absl::IsCancelled(found.answer.status())) return found.answer.status();
   ++piece.next;
   // The pair was ranked, or failed, before the first contact was known.
@@ -273,10 +263,11 @@ absl::Status SceneStream::AdvanceBodies(uint32_t a, ScenePiece& piece) {
 }
 
 uint64_t SceneStream::CountFollowingUnits() {
-  if (ranking_ == nullptr) return 0;
-  std::vector<RankedPair> ranked = ranking_->Take();
-  if (ranked.empty()) return 0;
-  ranked_ = std::move(ranked);
+  if (ranking_ == nullptr || !ranked_.empty()) return 0;
+  ranked_ = ranking_->Take();
+  query_ = ranked_query_;
+  motion_options_.want_certificate = query_.want_certificate;
+  steps_per_look_ = 1;
   return ranked_.size();
 }
 
@@ -297,14 +288,6 @@ void SceneStream::Deliver(ScenePiece& piece) {
   counts_.candidates += counts.candidates;
   for (size_t i = 0; i < counts.found.size(); ++i) counts_.found[i] += counts.found[i];
   PiecedReplies::Deliver(piece);
-}
-
-// Messages of the head contain no answers.
-bool SceneStream::Join(const v1::FindCollisionsResponse& reply,
-                       v1::FindCollisionsResponse* waiting) {
-  if (waiting->pairs_size() == 0 || NamesRows(reply.columns())) return false;
-  waiting->MergeFrom(reply);
-  return true;
 }
 
 void SceneStream::OnAllDelivered() {

@@ -58,24 +58,21 @@ struct ScenePiece : Piece<v1::FindCollisionsResponse> {
 class SceneStream
     : public PiecedReplies<v1::FindCollisionsRequest, v1::FindCollisionsResponse, ScenePiece> {
  public:
-  SceneStream(CallContext& context, const CollisionParts& parts, const Bytes& request);
+  SceneStream(CallContext& context, const ServiceParts& parts, const Bytes& request);
 
  private:
   absl::Status Validate() override;
   absl::Status Prepare() override;
   absl::Status Step(ScenePiece& piece, Clock::time_point end) override;
-  uint64_t StepsPerLook() const override;
   size_t HeldBytes() const override;
   // The functions below require the mutex.
   uint64_t CountUnits() override { return search_->size(); }
   uint64_t CountFollowingUnits() override;
   void Deliver(ScenePiece& piece) override;
-  bool Join(const v1::FindCollisionsResponse& reply, v1::FindCollisionsResponse* waiting) override;
   void OnAllDelivered() override;
 
   // Called without the mutex.
   absl::Status ValidateChoice() const;
-  absl::Status ValidateLimit() const;
   // Answers the next ranked pair. CANCELLED.
   absl::Status AnswerRanked(ScenePiece& piece);
   // Starts to answer the pairs of pieces of a candidate.
@@ -101,7 +98,6 @@ class SceneStream
   // With a limit or first_only: the query of the pairs that are answered at the end, and the pairs
   // ranked so far.
   QueryOptions ranked_query_;
-  MotionOptions ranked_motion_;
   std::unique_ptr<RankedPairs> ranking_;
   // Written before the first piece of ranked pairs.
   std::vector<RankedPair> ranked_;

@@ -3,8 +3,6 @@
 #include <absl/strings/cord.h>
 #include <absl/strings/strip.h>
 
-#include "hulld/rpc/error_details.pb.h"
-
 namespace hulld::server {
 namespace {
 
@@ -15,13 +13,6 @@ constexpr char kInfoPayload[] = "type.googleapis.com/google.rpc.ErrorInfo";
 
 std::string ReasonName(v1::ErrorReason reason) {
   return std::string(absl::StripPrefix(v1::ErrorReason_Name(reason), kReasonPrefix));
-}
-
-std::optional<rpc::ErrorInfo> GivenInfo(const absl::Status& status) {
-  const absl::optional<absl::Cord> payload = status.GetPayload(kInfoPayload);
-  rpc::ErrorInfo info;
-  if (!payload.has_value() || !info.ParseFromString(std::string(*payload))) return std::nullopt;
-  return info;
 }
 
 // Returns the reason of codes that imply one.
@@ -60,28 +51,27 @@ absl::Status Draining() {
 
 v1::ErrorReason ReasonOf(const absl::Status& status) {
   v1::ErrorReason reason = v1::ERROR_REASON_UNSPECIFIED;
-  if (const std::optional<rpc::ErrorInfo> info = GivenInfo(status); info.has_value()) {
+  if (const std::optional<rpc::ErrorInfo> info = ErrorInfoOf(status); info.has_value()) {
     v1::ErrorReason_Parse(kReasonPrefix + info->reason(), &reason);
-    return reason;
   }
-  return ImpliedReason(status.code());
+  return reason;
 }
 
 std::optional<std::string> MetadataOf(const absl::Status& status, const std::string& key) {
-  const std::optional<rpc::ErrorInfo> info = GivenInfo(status);
+  const std::optional<rpc::ErrorInfo> info = ErrorInfoOf(status);
   if (!info.has_value()) return std::nullopt;
   const auto entry = info->metadata().find(key);
   if (entry == info->metadata().end()) return std::nullopt;
   return entry->second;
 }
 
-std::optional<std::string> EncodeErrorInfo(const absl::Status& status) {
-  if (const std::optional<rpc::ErrorInfo> info = GivenInfo(status)) {
-    return info->SerializeAsString();
-  }
+std::optional<rpc::ErrorInfo> ErrorInfoOf(const absl::Status& status) {
+  const absl::optional<absl::Cord> payload = status.GetPayload(kInfoPayload);
+  rpc::ErrorInfo info;
+  if (payload.has_value() && info.ParseFromString(std::string(*payload))) return info;
   const v1::ErrorReason reason = ImpliedReason(status.code());
   if (reason == v1::ERROR_REASON_UNSPECIFIED) return std::nullopt;
-  return EncodeErrorInfo(WithReason(status, reason));
+  return ErrorInfoOf(WithReason(status, reason));
 }
 
 }  // namespace hulld::server

@@ -9,6 +9,7 @@
 #include <string>
 #include <utility>
 
+#include "hulld/rpc/error_details.pb.h"
 #include "hulld/v1/error.pb.h"
 
 namespace hulld::server {
@@ -38,8 +39,8 @@ v1::ErrorReason ReasonOf(const absl::Status& status);
 // Returns a value of the metadata given to WithReason.
 std::optional<std::string> MetadataOf(const absl::Status& status, const std::string& key);
 
-// Returns the serialized google.rpc.ErrorInfo of an error; nullopt for an error without a reason.
-std::optional<std::string> EncodeErrorInfo(const absl::Status& status);
+// Returns the google.rpc.ErrorInfo of an error; nullopt for an error without a reason.
+std::optional<rpc::ErrorInfo> ErrorInfoOf(const absl::Status& status);
 
 }  // namespace hulld::server
 

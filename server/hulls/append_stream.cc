@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/base/check.h"
+#include "core/base/status_macros.h"
 #include "server/process/random_id.h"
 #include "server/wire/decode.h"
 #include "server/wire/encode.h"
@@ -32,17 +33,13 @@ void AddTo(v1::PointCounts* sums, const PointCounts& counts) {
 
 }  // namespace
 
-void AppendStream::Open() {
-  Locked([] {});
-}
-
 void AppendStream::OnDone() {
   const auto self = shared_from_this();
   ReadingStream::OnDone();
   Locked([this] {
     if (!session_.has_value()) return;
     LogApplied();
-    registry_.hulls().CloseAppend(*session_);
+    parts_.registry.hulls().CloseAppend(*session_);
   });
 }
 
@@ -60,27 +57,21 @@ void AppendStream::StartWork() {
 
 void AppendStream::OnMessage() {
   if (end().has_value()) return;
-  switch (request().message_case()) {
-    case v1::AppendPointsRequest::kOpen:
-      return HandleOpen(request().open());
-    case v1::AppendPointsRequest::kChunk:
-      return HandleChunk(request().chunk());
-    case v1::AppendPointsRequest::MESSAGE_NOT_SET:
-      return Fail(absl::InvalidArgumentError("the message is empty; set open or chunk"));
-  }
+  absl::Status status = absl::InvalidArgumentError("the message is empty; set open or chunk");
+  if (request().has_open()) status = HandleOpen(request().open());
+  if (request().has_chunk()) status = HandleChunk(request().chunk());
+  if (!status.ok()) Fail(status);
 }
 
 void AppendStream::OnNoMessage(const absl::Status& why) { Fail(OrStopped(why)); }
 
-void AppendStream::HandleOpen(const v1::AppendOpen& open) {
+absl::Status AppendStream::HandleOpen(const v1::AppendOpen& open) {
   if (session_.has_value()) {
-    return Fail(absl::InvalidArgumentError(
-        "open was sent twice; a stream appends to one hull; start a new stream"));
+    return absl::InvalidArgumentError(
+        "open was sent twice; a stream appends to one hull; start a new stream");
   }
-  if (absl::Status s = CheckHullId(call().caller(), open.hull_id(), "open.hull_id"); !s.ok()) {
-    return Fail(s);
-  }
-  if (absl::Status s = ValidateWriterId(open.writer_id()); !s.ok()) return Fail(s);
+  HULLD_RETURN_IF_ERROR(CheckHullId(call().caller(), open.hull_id(), "open.hull_id"));
+  HULLD_RETURN_IF_ERROR(ValidateWriterId(open.writer_id()));
   writer_id_ = open.writer_id().empty() ? RandomId() : open.writer_id();
   opening_ = true;
   const auto on_gone = [weak = weak_from_this()](const absl::Status& reason) {
@@ -90,7 +81,7 @@ void AppendStream::HandleOpen(const v1::AppendOpen& open) {
     self.Locked([&] { self.Fail(reason); });
   };
   hull_id_ = open.hull_id();
-  registry_.hulls().OpenAppend(
+  parts_.registry.hulls().OpenAppend(
       open.hull_id(), writer_id_, open.create_if_absent(), on_gone,
       [this, self = shared_from_this()](const absl::StatusOr<OpenResult>& opened) {
         Locked([&] {
@@ -99,6 +90,7 @@ void AppendStream::HandleOpen(const v1::AppendOpen& open) {
         });
       },
       call().client());
+  return absl::OkStatus();
 }
 
 void AppendStream::HandleOpened(const absl::StatusOr<OpenResult>& opened) {
@@ -110,29 +102,29 @@ void AppendStream::HandleOpened(const absl::StatusOr<OpenResult>& opened) {
   if (end().has_value()) return;
   v1::AppendPointsResponse opened_reply;
   v1::AppendOpened* reply = opened_reply.mutable_opened();
-  EncodeHeader(registry_.store(), opened->store_revision, reply->mutable_header());
+  EncodeHeader(parts_.store, opened->store_revision, reply->mutable_header());
   EncodeRecord(opened->hull, reply->mutable_hull());
   reply->set_writer_id(writer_id_);
   reply->set_last_sequence(opened->last_sequence);
   Queue(std::move(opened_reply));
 }
 
-void AppendStream::HandleChunk(const v1::AppendChunk& message) {
+absl::Status AppendStream::HandleChunk(const v1::AppendChunk& message) {
   if (!session_.has_value()) {
-    return Fail(absl::InvalidArgumentError("the first message must be open, not a chunk"));
+    return absl::InvalidArgumentError("the first message must be open, not a chunk");
   }
-  absl::StatusOr<Chunk> chunk = DecodeChunk(message, registry_.limits().max_points_per_chunk);
-  if (!chunk.ok()) return Fail(chunk.status());
+  HULLD_ASSIGN_OR_RETURN(Chunk chunk,
+                         DecodeChunk(message, parts_.registry.limits().max_points_per_chunk));
   request().Clear();
   ++unbuilt_;
   ++uncommitted_;
-  call().AddPoints(chunk->points.size());
+  call().AddPoints(chunk.points.size());
   const auto self = shared_from_this();
-  const uint64_t sequence = chunk->sequence;
+  const uint64_t sequence = chunk.sequence;
   const uint64_t number = results_.Number();
   const auto arrival = std::chrono::steady_clock::now();
-  registry_.hulls().Append(
-      *session_, *std::move(chunk), [this, self] { return call().ShouldStop(); },
+  parts_.registry.hulls().Append(
+      *session_, std::move(chunk), [this, self] { return call().ShouldStop(); },
       [this, self] { Locked([this] { --unbuilt_; }); },
       [this, self, sequence, number, arrival](const absl::StatusOr<ChunkResult>& result) {
         Locked([&] {
@@ -142,6 +134,7 @@ void AppendStream::HandleChunk(const v1::AppendChunk& message) {
                         [this](const SequenceResult& each) { HandleResult(each); });
         });
       });
+  return absl::OkStatus();
 }
 
 void AppendStream::HandleResult(const SequenceResult& chunk) {
@@ -161,15 +154,15 @@ void AppendStream::HandleResult(const SequenceResult& chunk) {
   if (call().ShouldStop()) return;  // the client disconnected
   // `opened` is sent before the first chunk is read, so a queued reply can only be an ack.
   if (LastWaiting() == nullptr) Queue({});
-  HULLD_CHECK(!LastWaiting()->has_opened());
-  v1::AppendAck* ack = LastWaiting()->mutable_ack();
-  EncodeHeader(registry_.store(), result->store_revision, ack->mutable_header());
+  HULLD_CHECK(!LastWaiting()->reply.has_opened());
+  v1::AppendAck* ack = LastWaiting()->reply.mutable_ack();
+  EncodeHeader(parts_.store, result->store_revision, ack->mutable_header());
   ack->set_sequence(std::max(ack->sequence(), sequence));
   if (ack->outcome() != v1::APPEND_OUTCOME_APPLIED) {
     ack->set_outcome(result->already_applied ? v1::APPEND_OUTCOME_ALREADY_APPLIED
                                              : v1::APPEND_OUTCOME_APPLIED);
   }
-  ack->set_durability(EncodeDurability(registry_.store().durability()));
+  ack->set_durability(EncodeDurability(parts_.store.durability()));
   ack->set_hull_revision(result->hull_revision);
   ack->set_vertex_count(result->vertex_count);
   AddTo(ack->mutable_counts(), result->counts);

@@ -11,8 +11,8 @@
 
 #include "hulld/v1/hull.pb.h"
 #include "server/call/queued_stream.h"
+#include "server/call/service_parts.h"
 #include "server/hulls/in_order.h"
-#include "server/registry/registry.h"
 
 namespace hulld::server {
 
@@ -24,8 +24,8 @@ namespace hulld::server {
 class AppendStream : public ReadingStream<QueuedStream<BidiReactor, v1::AppendPointsResponse>,
                                           v1::AppendPointsRequest> {
  public:
-  AppendStream(CallContext& context, Admission& admission, Registry& registry)
-      : ReadingStream(context, admission, Rpc::kAppendPoints), registry_(registry) {}
+  AppendStream(CallContext& context, const ServiceParts& parts)
+      : ReadingStream(context, parts.admission, Rpc::kAppendPoints), parts_(parts) {}
 
  private:
   struct SequenceResult {
@@ -33,7 +33,6 @@ class AppendStream : public ReadingStream<QueuedStream<BidiReactor, v1::AppendPo
     absl::StatusOr<ChunkResult> result;
   };
 
-  void Open() override;
   void OnDone() override;
 
   // The members below require the mutex.
@@ -41,14 +40,14 @@ class AppendStream : public ReadingStream<QueuedStream<BidiReactor, v1::AppendPo
   bool IsWorking() const override { return opening_ || unbuilt_ > 0 || uncommitted_ > 0; }
   void OnMessage() override;
   void OnNoMessage(const absl::Status& why) override;
-  void HandleOpen(const v1::AppendOpen& open);
-  void HandleChunk(const v1::AppendChunk& message);
+  absl::Status HandleOpen(const v1::AppendOpen& open);
+  absl::Status HandleChunk(const v1::AppendChunk& message);
   void HandleOpened(const absl::StatusOr<OpenResult>& opened);
   void HandleResult(const SequenceResult& chunk);
   void LogApplied();
   void Fail(const absl::Status& status);
 
-  Registry& registry_;
+  const ServiceParts& parts_;
   std::optional<AppendSession> session_;
   std::string hull_id_;
   std::string writer_id_;

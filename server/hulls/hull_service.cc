@@ -34,52 +34,51 @@ void AddListed(const HullChange& hull, v1::ListHullsResponse& response) {
 }  // namespace
 
 UnaryReactor* HullService::CreateHull(CallContext* context, const Bytes* request, Bytes* response) {
-  return CreateCall::Start(*context, admission_, Rpc::kCreateHull, {request, response},
+  return CreateCall::Start(context, parts_.admission, Rpc::kCreateHull, request, response,
                            [this](CreateCall* call) { Create(call); });
 }
 
 BidiReactor* HullService::AppendPoints(CallContext* context) {
-  return AppendStream::Launch(std::make_shared<AppendStream>(*context, admission_, registry_));
+  return AppendStream::Launch(std::make_shared<AppendStream>(*context, parts_));
 }
 
 ReadReactor* HullService::ReplaceHull(CallContext* context, Bytes* response) {
-  return ReplaceStream::Launch(
-      std::make_shared<ReplaceStream>(*context, admission_, registry_, writers_, response));
+  return ReplaceStream::Launch(std::make_shared<ReplaceStream>(*context, parts_, response));
 }
 
 UnaryReactor* HullService::GetHull(CallContext* context, const Bytes* request, Bytes* response) {
   return GetCall::Start(
-      *context, admission_, Rpc::kGetHull, {request, response}, [this](GetCall* call) {
+      context, parts_.admission, Rpc::kGetHull, request, response, [this](GetCall* call) {
         // The cost of an audit, or of sums over the surface, increases with the hull's size.
         const bool is_long = call->request().audit() || call->request().properties();
-        TaskPool& readers = is_long ? long_readers_ : readers_;
+        TaskPool& readers = is_long ? parts_.long_readers : parts_.readers;
         call->EndOn(readers,
                     [this, call] { return Get(call->request(), call->call(), &call->response()); });
       });
 }
 
 WriteReactor* HullService::GetHullMesh(CallContext* context, const Bytes* request) {
-  return MeshStream::Launch(
-      std::make_shared<MeshStream>(*context, admission_, registry_, long_readers_, *request));
+  return MeshStream::Launch(std::make_shared<MeshStream>(*context, parts_, *request));
 }
 
 UnaryReactor* HullService::ListHulls(CallContext* context, const Bytes* request, Bytes* response) {
-  return ListCall::Start(
-      *context, admission_, Rpc::kListHulls, {request, response}, [this](ListCall* call) {
-        EndListed(registry_, readers_, call, Rpc::kListHulls, {.hulls = true}, AddListed);
-      });
+  return ListCall::Start(context, parts_.admission, Rpc::kListHulls, request, response,
+                         [this](ListCall* call) {
+                           EndListed(parts_.registry, parts_.readers, call, Rpc::kListHulls,
+                                     {.hulls = true}, AddListed);
+                         });
 }
 
 UnaryReactor* HullService::DeleteHull(CallContext* context, const Bytes* request, Bytes* response) {
-  return DeleteCall::Start(
-      *context, admission_, Rpc::kDeleteHull, {request, response}, [this](DeleteCall* call) {
-        EndDeleted(registry_, call, registry_.hulls(), "hull", call->request().hull_id());
-      });
+  return DeleteCall::Start(context, parts_.admission, Rpc::kDeleteHull, request, response,
+                           [this](DeleteCall* call) {
+                             EndDeleted(parts_.registry, call, parts_.registry.hulls(), "hull",
+                                        call->request().hull_id());
+                           });
 }
 
 WriteReactor* HullService::WatchHulls(CallContext* context, const Bytes* request) {
-  return WatchStream::Launch(
-      std::make_shared<WatchStream>(*context, admission_, registry_, readers_, *request));
+  return WatchStream::Launch(std::make_shared<WatchStream>(*context, parts_, *request));
 }
 
 void HullService::Create(CreateCall* call) {
@@ -87,7 +86,7 @@ void HullService::Create(CreateCall* call) {
   if (absl::Status s = CheckHullId(call->call().caller(), request.hull_id(), "hull_id"); !s.ok()) {
     return call->End(s);
   }
-  registry_.hulls().Create(
+  parts_.registry.hulls().Create(
       request.hull_id(), request.if_absent(),
       [this, call](const absl::StatusOr<PutHullResult>& created) {
         if (!created.ok()) return call->End(created.status());
@@ -96,7 +95,7 @@ void HullService::Create(CreateCall* call) {
           call->call().LogChange("hull created", {"hull", hull.hull_id}, hull.revision);
         }
         v1::CreateHullResponse& response = call->response();
-        EncodeHeader(registry_.store(), created->store_revision, response.mutable_header());
+        EncodeHeader(parts_.store, created->store_revision, response.mutable_header());
         EncodeRecord(hull, response.mutable_hull());
         response.set_created(created->created);
         call->End(absl::OkStatus());
@@ -107,18 +106,17 @@ absl::Status HullService::Get(const v1::GetHullRequest& request, const Call& cal
                               v1::GetHullResponse* response) {
   HULLD_RETURN_IF_ERROR(CheckHullId(call.caller(), request.hull_id(), "hull_id"));
   HULLD_ASSIGN_OR_RETURN(const Freshness freshness,
-                         DecodeFreshness(request.freshness(), registry_.store(), call.arrival()));
-  const auto resolved = registry_.Resolve(
-      request.hull_id(), [&call] { return call.ShouldStop(); }, freshness);
-  if (!resolved.ok()) return resolved.status();
-  const auto& [as_of, view] = *resolved;
-  EncodeHeader(registry_.store(), as_of, response->mutable_header());
+                         DecodeFreshness(request.freshness(), parts_.store, call.arrival()));
+  const auto should_stop = [&call] { return call.ShouldStop(); };
+  HULLD_ASSIGN_OR_RETURN(const auto resolved,
+                         parts_.registry.Resolve(request.hull_id(), should_stop, freshness));
+  const auto& [as_of, view] = resolved;
+  EncodeHeader(parts_.store, as_of, response->mutable_header());
   EncodeRecord(view.record, response->mutable_hull());
   EncodeBox(*view.served, response);
   const bool wants_properties = request.properties() && !view.served->empty();
   if (request.without_facets() && !request.audit() && !wants_properties) return absl::OkStatus();
-  const auto should_stop = [&call] { return call.ShouldStop(); };
-  HULLD_ASSIGN_OR_RETURN(const Hull* hull, registry_.reader().Canonical(view, should_stop));
+  HULLD_ASSIGN_OR_RETURN(const Hull* hull, parts_.registry.reader().Canonical(view, should_stop));
   if (!request.without_facets()) {
     response->set_edge_count(hull->edges().size());
     response->set_facet_count(hull->facet_count());

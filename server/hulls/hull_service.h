@@ -4,12 +4,10 @@
 #include <grpcpp/grpcpp.h>
 
 #include "hulld/v1/hull.grpc.pb.h"
-#include "server/call/admission.h"
 #include "server/call/call.h"
 #include "server/call/call_stream.h"
+#include "server/call/service_parts.h"
 #include "server/call/unary_call.h"
-#include "server/process/task_pool.h"
-#include "server/registry/registry.h"
 
 namespace hulld::server {
 
@@ -30,13 +28,7 @@ using HullServiceOfBytes = v1::HullService::WithRawCallbackMethod_CreateHull<
 // `writers`. Watches read records on notification, and boxes from the store on `readers`.
 class HullService : public HullServiceOfBytes {
  public:
-  HullService(Registry& registry, Admission& admission, TaskPool& writers, TaskPool& readers,
-              TaskPool& long_readers)
-      : registry_(registry),
-        admission_(admission),
-        writers_(writers),
-        readers_(readers),
-        long_readers_(long_readers) {}
+  explicit HullService(const ServiceParts& parts) : parts_(parts) {}
 
   UnaryReactor* CreateHull(CallContext* context, const Bytes* request, Bytes* response) override;
   BidiReactor* AppendPoints(CallContext* context) override;
@@ -58,11 +50,7 @@ class HullService : public HullServiceOfBytes {
   absl::Status Get(const v1::GetHullRequest& request, const Call& call,
                    v1::GetHullResponse* response);
 
-  Registry& registry_;
-  Admission& admission_;
-  TaskPool& writers_;
-  TaskPool& readers_;
-  TaskPool& long_readers_;
+  const ServiceParts& parts_;
 };
 
 }  // namespace hulld::server

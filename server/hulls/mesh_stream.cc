@@ -22,7 +22,7 @@ constexpr int kIndicesPerMessage = Config::kReplyMessageBytes / 5;
 }  // namespace
 
 void MeshStream::Open() {
-  RunOn(readers_, [this] {
+  RunOn(parts_.long_readers, [this] {
     const absl::Status made = MakeHeader();
     if (call().ShouldStop()) return FinishCall(call().StopStatus());
     if (!made.ok()) return FinishCall(made);
@@ -31,23 +31,21 @@ void MeshStream::Open() {
 }
 
 absl::Status MeshStream::MakeHeader() {
-  absl::Status valid = CheckHullId(call().caller(), request().hull_id(), "hull_id");
-  if (!valid.ok()) return valid;
+  HULLD_RETURN_IF_ERROR(CheckHullId(call().caller(), request().hull_id(), "hull_id"));
   const auto should_stop = [this] { return call().ShouldStop(); };
-  HULLD_ASSIGN_OR_RETURN(
-      const Freshness freshness,
-      DecodeFreshness(request().freshness(), registry_.store(), call().arrival()));
+  HULLD_ASSIGN_OR_RETURN(const Freshness freshness,
+                         DecodeFreshness(request().freshness(), parts_.store, call().arrival()));
   HULLD_ASSIGN_OR_RETURN(const auto resolved,
-                         registry_.Resolve(request().hull_id(), should_stop, freshness));
+                         parts_.registry.Resolve(request().hull_id(), should_stop, freshness));
   HULLD_ASSIGN_OR_RETURN(const Hull* hull,
-                         registry_.reader().Canonical(resolved.second, should_stop));
+                         parts_.registry.reader().Canonical(resolved.second, should_stop));
   mesh_ = std::shared_ptr<const Hull>(resolved.second.served, hull);
   v1::MeshHeader* header = reply().mutable_header();
   if (request().has_simplification()) {
     const absl::Status simplified = Simplify(request().simplification(), header);
     if (!simplified.ok()) return Prefixed("simplification: ", simplified);
   }
-  EncodeHeader(registry_.store(), resolved.first, header->mutable_header());
+  EncodeHeader(parts_.store, resolved.first, header->mutable_header());
   EncodeRecord(resolved.second.record, header->mutable_hull());
   header->set_facet_count(mesh_->facet_count());
   header->set_vertex_count(mesh_->vertices().size());
@@ -59,20 +57,14 @@ absl::Status MeshStream::Simplify(const v1::Simplification& simplification,
   const SimplifyTarget target = {static_cast<size_t>(simplification.max_vertices()),
                                  simplification.max_error(),
                                  [this] { return call().ShouldStop(); }};
-  absl::StatusOr<SimplifiedHull> simplified;
-  switch (simplification.side()) {
-    case v1::SIMPLIFICATION_SIDE_INSIDE:
-      simplified = SimplifyInside(*mesh_, target);
-      break;
-    case v1::SIMPLIFICATION_SIDE_OUTSIDE:
-      simplified = SimplifyOutside(*mesh_, target);
-      break;
-    default:
-      return absl::InvalidArgumentError("side must be INSIDE or OUTSIDE");
+  const bool is_inside = simplification.side() == v1::SIMPLIFICATION_SIDE_INSIDE;
+  if (!is_inside && simplification.side() != v1::SIMPLIFICATION_SIDE_OUTSIDE) {
+    return absl::InvalidArgumentError("side must be INSIDE or OUTSIDE");
   }
-  if (!simplified.ok()) return simplified.status();
-  header->set_error(simplified->error);
-  mesh_ = std::make_shared<const Hull>(std::move(simplified->hull));
+  HULLD_ASSIGN_OR_RETURN(SimplifiedHull simplified, is_inside ? SimplifyInside(*mesh_, target)
+                                                              : SimplifyOutside(*mesh_, target));
+  header->set_error(simplified.error);
+  mesh_ = std::make_shared<const Hull>(std::move(simplified.hull));
   return absl::OkStatus();
 }
 

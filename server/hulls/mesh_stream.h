@@ -8,8 +8,7 @@
 
 #include "hulld/v1/hull.pb.h"
 #include "server/call/pulled_stream.h"
-#include "server/process/task_pool.h"
-#include "server/registry/registry.h"
+#include "server/call/service_parts.h"
 
 namespace hulld::server {
 
@@ -17,11 +16,8 @@ namespace hulld::server {
 class MeshStream : public RequestStream<PulledStream<WriteReactor, v1::GetHullMeshResponse>,
                                         v1::GetHullMeshRequest> {
  public:
-  MeshStream(CallContext& context, Admission& admission, Registry& registry, TaskPool& readers,
-             const Bytes& request)
-      : RequestStream(request, context, admission, Rpc::kGetHullMesh),
-        registry_(registry),
-        readers_(readers) {}
+  MeshStream(CallContext& context, const ServiceParts& parts, const Bytes& request)
+      : RequestStream(request, context, parts.admission, Rpc::kGetHullMesh), parts_(parts) {}
 
  private:
   void Open() override;
@@ -34,8 +30,7 @@ class MeshStream : public RequestStream<PulledStream<WriteReactor, v1::GetHullMe
   void FillVertices(v1::MeshVertices* message);
   void FillFacets(v1::MeshFacets* message);
 
-  Registry& registry_;
-  TaskPool& readers_;
+  const ServiceParts& parts_;
   // The hull to send, or its simplification.
   std::shared_ptr<const Hull> mesh_;
   size_t next_vertex_ = 0;

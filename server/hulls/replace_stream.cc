@@ -18,7 +18,7 @@ void ReplaceStream::OnNoMessage(const absl::Status& why) {
   if (!why.ok()) return FinishCall(why);
   const bool opened = replacement_.builder != nullptr;
   // Only the empty block distinguishes a complete request from a client that disconnected.
-  if (opened && complete_) return RunOn(writers_, [this] { Commit(); });
+  if (opened && complete_) return RunOn(parts_.writers, [this] { Commit(); });
   FinishCall(absl::InvalidArgumentError(opened
                                             ? "the stream ended without the empty block of points "
                                               "that marks its end; the hull is unchanged"
@@ -30,7 +30,7 @@ void ReplaceStream::OnMessage() {
   ++messages_;
   if (absl::Status s = HandleMessage(); !s.ok()) return FinishCall(s);
   if (!request().has_points() || complete_) return Read();
-  RunOn(writers_, [this, arrival = std::chrono::steady_clock::now()] {
+  RunOn(parts_.writers, [this, arrival = std::chrono::steady_clock::now()] {
     const absl::Status built = Build();
     if (!built.ok()) return FinishCall(OrStopped(built));
     call().EndMessage(arrival);
@@ -41,20 +41,16 @@ void ReplaceStream::OnMessage() {
 // Handles a message, except for building.
 absl::Status ReplaceStream::HandleMessage() {
   const bool opened = replacement_.builder != nullptr;
-  switch (request().message_case()) {
-    case v1::ReplaceHullRequest::kOpen:
-      if (!opened) return HandleOpen(request().open());
-      return absl::InvalidArgumentError("open was sent twice; start a new stream");
-    case v1::ReplaceHullRequest::kPoints:
-      if (!opened) {
-        return absl::InvalidArgumentError("the first message must be open, not points");
-      }
-      complete_ = request().points().xyz().empty() && request().points().xyz_float().empty();
-      return absl::OkStatus();
-    case v1::ReplaceHullRequest::MESSAGE_NOT_SET:
-      break;
+  if (request().has_open()) {
+    if (!opened) return HandleOpen(request().open());
+    return absl::InvalidArgumentError("open was sent twice; start a new stream");
   }
-  return absl::InvalidArgumentError("the message is empty; set open or points");
+  if (!request().has_points()) {
+    return absl::InvalidArgumentError("the message is empty; set open or points");
+  }
+  if (!opened) return absl::InvalidArgumentError("the first message must be open, not points");
+  complete_ = request().points().xyz().empty() && request().points().xyz_float().empty();
+  return absl::OkStatus();
 }
 
 absl::Status ReplaceStream::HandleOpen(const v1::ReplaceOpen& open) {
@@ -68,7 +64,7 @@ absl::Status ReplaceStream::HandleOpen(const v1::ReplaceOpen& open) {
 
 absl::Status ReplaceStream::Build() {
   const std::string name = absl::StrCat("message ", messages_, ": ");
-  const Limits& limits = registry_.limits();
+  const Limits& limits = parts_.registry.limits();
   const absl::StatusOr<std::vector<Vector>> points =
       DecodePoints(request().points(), limits.max_points_per_chunk);
   if (!points.ok()) return Prefixed(name, points.status());
@@ -78,7 +74,7 @@ absl::Status ReplaceStream::Build() {
     return LimitExceeded(absl::StrCat(name, "the hull would have received ", received, " points"),
                          limits.max_points_per_hull, "max-points-per-hull");
   }
-  if (absl::Status s = registry_.CheckMemory(MemoryUse::kWriting); !s.ok())
+  if (absl::Status s = parts_.registry.CheckMemory(MemoryUse::kWriting); !s.ok())
     return Prefixed(name, s);
   const absl::StatusOr<PointCounts> added = replacement_.builder->Add(
       *points,
@@ -95,7 +91,7 @@ absl::Status ReplaceStream::Build() {
 
 void ReplaceStream::Commit() {
   // The registry answers on another thread after the commit.
-  const Store& store = registry_.store();
+  const Store& store = parts_.store;
   const auto done = [this, &store](const absl::StatusOr<PutHullResult>& result) {
     // The memory was counted twice after the registry took ownership, which at worst evicted a
     // snapshot.
@@ -112,7 +108,7 @@ void ReplaceStream::Commit() {
     *response_ = SerializeReply(response);
     FinishCall(absl::OkStatus());
   };
-  registry_.hulls().Replace(std::move(replacement_), done);
+  parts_.registry.hulls().Replace(std::move(replacement_), done);
 }
 
 }  // namespace hulld::server

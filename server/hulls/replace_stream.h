@@ -9,8 +9,7 @@
 #include "core/hull/growth/hull_builder.h"
 #include "hulld/v1/hull.pb.h"
 #include "server/call/call_stream.h"
-#include "server/process/task_pool.h"
-#include "server/registry/registry.h"
+#include "server/call/service_parts.h"
 
 namespace hulld::server {
 
@@ -19,14 +18,12 @@ namespace hulld::server {
 // flight at a time, so the state needs no mutex.
 class ReplaceStream : public ReadingStream<CallStream<ReadReactor>, v1::ReplaceHullRequest> {
  public:
-  // writers: the threads that build the hull. response: owned by gRPC until the call ends.
-  ReplaceStream(CallContext& context, Admission& admission, Registry& registry, TaskPool& writers,
-                Bytes* response)
-      : ReadingStream(context, admission, Rpc::kReplaceHull),
-        registry_(registry),
-        writers_(writers),
+  // response: owned by gRPC until the call ends.
+  ReplaceStream(CallContext& context, const ServiceParts& parts, Bytes* response)
+      : ReadingStream(context, parts.admission, Rpc::kReplaceHull),
+        parts_(parts),
         response_(response),
-        charge_(registry.memory(), MemoryUse::kWriting) {}
+        charge_(parts.registry.memory(), MemoryUse::kWriting) {}
 
  private:
   void Open() override { Read(); }
@@ -38,8 +35,7 @@ class ReplaceStream : public ReadingStream<CallStream<ReadReactor>, v1::ReplaceH
   absl::Status Build();
   void Commit();
 
-  Registry& registry_;
-  TaskPool& writers_;
+  const ServiceParts& parts_;
   Bytes* const response_;
   // Memory charged for the builder until the registry takes ownership.
   MemoryCharge charge_;

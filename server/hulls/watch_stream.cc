@@ -1,9 +1,9 @@
 #include "server/hulls/watch_stream.h"
 
 #include <algorithm>
+#include <array>
 #include <utility>
 
-#include "core/base/check.h"
 #include "core/base/status_macros.h"
 #include "server/wire/encode.h"
 
@@ -15,20 +15,12 @@ bool WantsBox(const HullChange& change) {
   return change.record.vertex_count > 0 && change.box.IsEmpty() && !change.damaged;
 }
 
+// The array is in the order of ChangeKind.
 v1::HullEventKind EncodeKind(ChangeKind kind) {
-  switch (kind) {
-    case ChangeKind::kPresent:
-      return v1::HULL_EVENT_KIND_PRESENT;
-    case ChangeKind::kCreated:
-      return v1::HULL_EVENT_KIND_CREATED;
-    case ChangeKind::kChanged:
-      return v1::HULL_EVENT_KIND_CHANGED;
-    case ChangeKind::kReplaced:
-      return v1::HULL_EVENT_KIND_REPLACED;
-    case ChangeKind::kDeleted:
-      return v1::HULL_EVENT_KIND_DELETED;
-  }
-  HULLD_UNREACHABLE();
+  static constexpr std::array kKinds = {v1::HULL_EVENT_KIND_PRESENT, v1::HULL_EVENT_KIND_CREATED,
+                                        v1::HULL_EVENT_KIND_CHANGED, v1::HULL_EVENT_KIND_REPLACED,
+                                        v1::HULL_EVENT_KIND_DELETED};
+  return kKinds[static_cast<size_t>(kind)];
 }
 
 void EncodeEvent(const HullChange& change, v1::HullEvent* event) {
@@ -56,27 +48,26 @@ void EncodeEvent(const HullChange& change, v1::HullEvent* event) {
 }  // namespace
 
 void WatchStream::Open() {
-  const absl::StatusOr<WatchTarget> target = ReadTarget();
-  if (!target.ok()) return FinishCall(target.status());
-  const absl::StatusOr<WatchPosition> position = ReadPosition();
-  if (!position.ok()) return FinishCall(position.status());
-  RunOn(readers_, [this, target = *target, position = *position] { Begin(target, position); });
+  RunOn(parts_.readers, [this] {
+    const absl::Status begun = Begin();
+    begun.ok() ? SendNext() : FinishCall(OrStopped(begun));
+  });
 }
 
-// The watch includes all changes that this server or a peer server acknowledged before the call.
-void WatchStream::Begin(const WatchTarget& target, const WatchPosition& position) {
-  const auto should_stop = [this] { return call().ShouldStop(); };
-  const absl::Status fresh = registry_.barrier().AwaitPeers(should_stop);
-  if (call().ShouldStop()) return FinishCall(call().StopStatus());
-  if (!fresh.ok()) return FinishCall(fresh);
-  absl::StatusOr<std::shared_ptr<Watch>> watch =
-      registry_.feed().Open(target, position, [this, self = shared_from_this()] { SendNext(); });
-  if (!watch.ok()) return FinishCall(watch.status());
-  {
-    const std::lock_guard lock(watch_mutex_);
-    watch_ = *std::move(watch);
+// Opens the watch. It includes all changes that this server or a peer server acknowledged before
+// the call.
+absl::Status WatchStream::Begin() {
+  HULLD_ASSIGN_OR_RETURN(const WatchTarget target, ReadTarget());
+  if (request().after_revision() > 0 && request().store_id().empty()) {
+    return absl::InvalidArgumentError(
+        "after_revision requires store_id; use the one from the same header");
   }
-  SendNext();
+  HULLD_RETURN_IF_ERROR(
+      parts_.registry.barrier().AwaitPeers([this] { return call().ShouldStop(); }));
+  HULLD_ASSIGN_OR_RETURN(watch_, parts_.registry.feed().Open(
+                                     target, {request().after_revision(), request().store_id()},
+                                     [this, self = shared_from_this()] { SendNext(); }));
+  return absl::OkStatus();
 }
 
 absl::StatusOr<WatchTarget> WatchStream::ReadTarget() const {
@@ -87,17 +78,8 @@ absl::StatusOr<WatchTarget> WatchStream::ReadTarget() const {
   if (!request().prefix().empty()) {
     return absl::InvalidArgumentError("prefix and hull_id are both set; set one of them");
   }
-  const absl::Status valid = CheckHullId(call().caller(), request().hull_id(), "hull_id");
-  if (!valid.ok()) return valid;
+  HULLD_RETURN_IF_ERROR(CheckHullId(call().caller(), request().hull_id(), "hull_id"));
   return WatchTarget{"", {request().hull_id()}, request().bodies()};
-}
-
-absl::StatusOr<WatchPosition> WatchStream::ReadPosition() const {
-  if (request().after_revision() > 0 && request().store_id().empty()) {
-    return absl::InvalidArgumentError(
-        "after_revision requires store_id; use the one from the same header");
-  }
-  return WatchPosition{request().after_revision(), request().store_id()};
 }
 
 // Sends the next batch, or waits for on_ready, which calls this function again. At most one such
@@ -105,7 +87,7 @@ absl::StatusOr<WatchPosition> WatchStream::ReadPosition() const {
 void WatchStream::SendNext() {
   while (true) {
     if (call().ShouldStop()) return FinishCall(call().StopStatus());
-    absl::StatusOr<WatchBatch> batch = registry_.feed().Next(watch_);
+    absl::StatusOr<WatchBatch> batch = parts_.registry.feed().Next(watch_);
     if (!batch.ok()) return FinishCall(batch.status());
     // on_ready may already run on another thread.
     if (batch->waits) return;
@@ -113,7 +95,7 @@ void WatchStream::SendNext() {
     const bool is_mark = batch->revision > sent_revision_;
     if (batch->changes.empty() && !batch->synced && !batch->restarted && !is_mark) continue;
     if (!std::ranges::any_of(batch->changes, WantsBox)) return SendBatch(*batch);
-    return RunOn(readers_, [this, loaded = *std::move(batch)]() mutable {
+    return RunOn(parts_.readers, [this, loaded = *std::move(batch)]() mutable {
       const absl::Status status = LoadBoxes(&loaded);
       if (!status.ok()) return FinishCall(OrStopped(status));
       SendBatch(loaded);
@@ -128,7 +110,7 @@ absl::Status WatchStream::LoadBoxes(WatchBatch* batch) {
   loaded.reserve(batch->changes.size());
   for (HullChange& change : batch->changes) {
     if (WantsBox(change)) {
-      const auto resolved = registry_.Resolve(
+      const auto resolved = parts_.registry.Resolve(
           change.record.hull_id, [this] { return call().ShouldStop(); }, Freshness::AnyStaleness());
       const absl::Status& status = resolved.status();
       if (absl::IsNotFound(status)) continue;
@@ -148,7 +130,7 @@ absl::Status WatchStream::LoadBoxes(WatchBatch* batch) {
 
 void WatchStream::SendBatch(const WatchBatch& batch) {
   sent_revision_ = batch.revision;
-  EncodeHeader(registry_.store(), batch.revision, reply().mutable_header());
+  EncodeHeader(parts_.store, batch.revision, reply().mutable_header());
   reply().set_synced(batch.synced);
   reply().set_restarted(batch.restarted);
   for (const HullChange& change : batch.changes) EncodeEvent(change, reply().add_events());
@@ -158,7 +140,7 @@ void WatchStream::SendBatch(const WatchBatch& batch) {
 void WatchStream::OnSent() {
   reply().Clear();
   if (is_synced_) return SendNext();
-  RunOn(readers_, [this] { SendNext(); });
+  RunOn(parts_.readers, [this] { SendNext(); });
 }
 
 void WatchStream::OnCancel() {
@@ -167,23 +149,13 @@ void WatchStream::OnCancel() {
 }
 
 void WatchStream::Nudge() {
-  std::shared_ptr<Watch> watch;
-  {
-    const std::lock_guard lock(watch_mutex_);
-    watch = watch_;
-  }
-  if (watch != nullptr) registry_.feed().Nudge(watch);
+  if (const auto watch = watch_.load()) parts_.registry.feed().Nudge(watch);
 }
 
 void WatchStream::OnDone() {
   const auto self = shared_from_this();
   PulledStream::OnDone();
-  std::shared_ptr<Watch> watch;
-  {
-    const std::lock_guard lock(watch_mutex_);
-    watch = std::exchange(watch_, nullptr);
-  }
-  if (watch != nullptr) registry_.feed().Close(watch);
+  if (const auto watch = watch_.exchange(nullptr)) parts_.registry.feed().Close(watch);
 }
 
 }  // namespace hulld::server

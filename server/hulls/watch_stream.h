@@ -5,14 +5,13 @@
 #include <absl/status/statusor.h>
 #include <grpcpp/grpcpp.h>
 
+#include <atomic>
 #include <cstdint>
 #include <memory>
-#include <mutex>
 
 #include "hulld/v1/hull.pb.h"
 #include "server/call/pulled_stream.h"
-#include "server/process/task_pool.h"
-#include "server/registry/registry.h"
+#include "server/call/service_parts.h"
 #include "server/registry/watch/change_watch.h"
 
 namespace hulld::server {
@@ -22,11 +21,8 @@ namespace hulld::server {
 class WatchStream : public RequestStream<PulledStream<WriteReactor, v1::WatchHullsResponse>,
                                          v1::WatchHullsRequest> {
  public:
-  WatchStream(CallContext& context, Admission& admission, Registry& registry, TaskPool& readers,
-              const Bytes& request)
-      : RequestStream(request, context, admission, Rpc::kWatchHulls),
-        registry_(registry),
-        readers_(readers) {}
+  WatchStream(CallContext& context, const ServiceParts& parts, const Bytes& request)
+      : RequestStream(request, context, parts.admission, Rpc::kWatchHulls), parts_(parts) {}
 
  private:
   void Open() override;
@@ -35,20 +31,17 @@ class WatchStream : public RequestStream<PulledStream<WriteReactor, v1::WatchHul
   void OnRevoked() override { Nudge(); }
   void OnDone() override;
 
-  void Begin(const WatchTarget& target, const WatchPosition& position);
+  absl::Status Begin();
   absl::StatusOr<WatchTarget> ReadTarget() const;
-  absl::StatusOr<WatchPosition> ReadPosition() const;
   void SendNext();
   absl::Status LoadBoxes(WatchBatch* batch);
   void SendBatch(const WatchBatch& batch);
   // Makes the stream check whether it should stop.
   void Nudge();
 
-  Registry& registry_;
-  TaskPool& readers_;
-  // Guards the assignment and reset of watch_ against threads that cancel.
-  std::mutex watch_mutex_;
-  std::shared_ptr<Watch> watch_;
+  const ServiceParts& parts_;
+  // Read by threads that cancel.
+  std::atomic<std::shared_ptr<Watch>> watch_;
   // True after the existing hulls were sent.
   bool is_synced_ = false;
   // The revision of the last header.

@@ -78,6 +78,8 @@ void SetPort(sockaddr* name, int port) {
   if (name->sa_family == AF_INET6) reinterpret_cast<sockaddr_in6*>(name)->sin6_port = number;
 }
 
+int DescriptorOf(uint64_t id) { return static_cast<int>(id % kMaxGuardedDescriptors); }
+
 bool IsWildcard(const std::string& host) { return host == "0.0.0.0" || host == "::"; }
 
 }  // namespace
@@ -113,7 +115,7 @@ ConnectionAcceptor::ConnectionAcceptor(const ListenAddress& address, ConnectionT
   const uint64_t most = MaxDescriptors();
   const uint64_t reserved = std::min(kReservedDescriptors, most / 4);
   first_reserved_ = static_cast<int>(std::min<uint64_t>(most - reserved, kMaxGuardedDescriptors));
-  max_closing_ = std::max<uint64_t>(1, reserved / 2);
+  max_closing_ = std::max<int64_t>(1, static_cast<int64_t>(reserved / 2));
   table_.LimitTo(static_cast<size_t>(std::max(1, first_reserved_)));
 }
 
@@ -163,13 +165,13 @@ absl::Status ConnectionAcceptor::Bind() {
 
 ConnectionAcceptor::~ConnectionAcceptor() {
   Stop();
-  std::map<uint64_t, Connection> open;
+  std::set<uint64_t> open;
   {
     const std::lock_guard lock(mutex_);
     open = connections_;
   }
-  for (const auto& [id, connection] : open) {
-    Unguard(connection.descriptor, id);
+  for (const uint64_t id : open) {
+    Unguard(DescriptorOf(id), id);
     table_.Remove(id);
   }
 }
@@ -258,7 +260,8 @@ void ConnectionAcceptor::Admit(Descriptor socket, const sockaddr_storage& name) 
     if (evicted == 0) return refused_descriptors_.Increment();
     Evict(evicted);
   }
-  const uint64_t id = ++last_id_;
+  const uint64_t id =
+      ++last_number_ * kMaxGuardedDescriptors + static_cast<uint64_t>(socket.number());
   const std::optional<PeerAddress> peer = PeerAddress::FromSocket(name);
   const ConnectionTable::Outcome outcome = table_.Add(id, peer);
   switch (outcome.refusal) {
@@ -276,7 +279,7 @@ void ConnectionAcceptor::Admit(Descriptor socket, const sockaddr_storage& name) 
   }
   {
     const std::lock_guard lock(mutex_);
-    connections_.emplace(id, Connection{socket.number()});
+    connections_.insert(id);
   }
   GuardSocket(socket.number(), id, frames_.has_value() ? &*frames_ : nullptr,
               [this, id] { OnClosed(id); });
@@ -286,26 +289,21 @@ void ConnectionAcceptor::Admit(Descriptor socket, const sockaddr_storage& name) 
 }
 
 void ConnectionAcceptor::Evict(uint64_t id) {
-  int descriptor = -1;
+  if (id == 0) return;
   {
     const std::lock_guard lock(mutex_);
-    const auto found = connections_.find(id);
-    if (found == connections_.end()) return;
-    found->second.is_evicted = true;
     ++closing_;
-    descriptor = found->second.descriptor;
   }
   closed_idle_.Increment();
   // gRPC reads the end of the connection and closes its descriptor.
-  ShutDown(descriptor, id);
+  ShutDown(DescriptorOf(id), id);
 }
 
 void ConnectionAcceptor::OnClosed(uint64_t id) {
-  table_.Remove(id);
+  const bool is_evicted = !table_.Remove(id);
   const std::lock_guard lock(mutex_);
-  const auto found = connections_.find(id);
-  if (found->second.is_evicted) --closing_;
-  connections_.erase(found);
+  if (is_evicted) --closing_;
+  connections_.erase(id);
   room_.notify_all();
 }
 

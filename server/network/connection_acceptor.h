@@ -8,10 +8,10 @@
 #include <condition_variable>
 #include <cstddef>
 #include <cstdint>
-#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <thread>
 #include <utility>
@@ -57,12 +57,6 @@ class ConnectionAcceptor {
   void Stop();
 
  private:
-  struct Connection {
-    // Owned by gRPC.
-    int descriptor;
-    bool is_evicted = false;
-  };
-
   ConnectionAcceptor(const ListenAddress& address, ConnectionTable& table, Metrics& metrics);
 
   absl::Status Bind();
@@ -87,19 +81,20 @@ class ConnectionAcceptor {
   // lowest free number, so receiving a reserved one shows that all lower ones are in use.
   int first_reserved_;
   // Maximum number of evicted connections that gRPC has not closed yet.
-  size_t max_closing_;
+  int64_t max_closing_;
   std::vector<Descriptor> listeners_;
   Descriptor wake_;
   Descriptor reserve_;
   std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> grpc_;
   std::optional<FrameLimits> frames_;
-  uint64_t last_id_ = 0;
+  // The ID of a connection is its number, followed by its descriptor, which gRPC owns.
+  uint64_t last_number_ = 0;
   std::mutex mutex_;
   // The mutex guards the members below. It is never held during calls of gRPC or of
   // guarded_sockets.h, which call OnClosed.
-  std::map<uint64_t, Connection> connections_;
+  std::set<uint64_t> connections_;
   // Number of evicted connections among them.
-  size_t closing_ = 0;
+  int64_t closing_ = 0;
   bool stopping_ = false;
   std::condition_variable room_;
   std::thread thread_;

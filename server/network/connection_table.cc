@@ -40,9 +40,12 @@ uint64_t ConnectionTable::EvictFirst(const IdleList& idle) {
   return id;
 }
 
-void ConnectionTable::Remove(uint64_t id) {
+bool ConnectionTable::Remove(uint64_t id) {
   const std::lock_guard lock(mutex_);
-  if (const auto found = connections_.find(id); found != connections_.end()) Erase(found);
+  const auto found = connections_.find(id);
+  if (found == connections_.end()) return false;
+  Erase(found);
+  return true;
 }
 
 void ConnectionTable::Erase(Connections::iterator connection) {

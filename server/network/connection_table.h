@@ -34,7 +34,8 @@ class ConnectionTable {
   Outcome Add(uint64_t id, const std::optional<PeerAddress>& peer);
   // Removes and returns the connection that has been idle longest; 0: none is idle.
   uint64_t Evict();
-  void Remove(uint64_t id);
+  // Returns false if the connection was evicted before.
+  bool Remove(uint64_t id);
 
   // Returns the connection of a peer; 0: none.
   uint64_t Find(const std::optional<PeerAddress>& peer) const;

@@ -1,15 +1,20 @@
 #include "server/process/log.h"
 
+#include <absl/strings/ascii.h>
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
 #include <absl/time/time.h>
+#include <google/protobuf/stubs/common.h>
 #include <google/protobuf/stubs/logging.h>
 #include <grpc/support/log.h>
 #include <spdlog/formatter.h>
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <chrono>
-#include <cstdio>
 #include <memory>
+#include <string_view>
 #include <utility>
 
 namespace hulld::server {
@@ -24,7 +29,7 @@ std::string FormatJson(const LogFields& fields) {
   std::string text;
   for (const LogField& field : fields) {
     const char* const quote = field.is_number ? "" : "\"";
-    text += std::string(",\"") + field.name + "\":" + quote + JsonEscape(field.value) + quote;
+    absl::StrAppend(&text, ",\"", field.name, "\":", quote, JsonEscape(field.value), quote);
   }
   return text;
 }
@@ -35,8 +40,8 @@ std::string FormatText(const LogFields& fields) {
   for (const LogField& field : fields) {
     const bool word =
         !field.value.empty() && field.value.find_first_of(" \"\\=\n\r\t") == std::string::npos;
-    const std::string escaped = JsonEscape(field.value);
-    text += std::string(" ") + field.name + "=" + (word ? escaped : "\"" + escaped + "\"");
+    const char* const quote = word ? "" : "\"";
+    absl::StrAppend(&text, " ", field.name, "=", quote, JsonEscape(field.value), quote);
   }
   return text;
 }
@@ -48,10 +53,10 @@ class JsonFormatter : public spdlog::formatter {
                                               absl::FromChrono(message.time), absl::UTCTimeZone());
     const auto level = spdlog::level::to_string_view(message.level);
     const std::string line =
-        "{\"time\":\"" + time + "\",\"level\":\"" + std::string(level.data(), level.size()) +
-        "\",\"message\":\"" +
-        JsonEscape(std::string(message.payload.data(), message.payload.size())) + "\"" +
-        (current_fields == nullptr ? "" : FormatJson(*current_fields)) + "}\n";
+        absl::StrCat("{\"time\":\"", time, "\",\"level\":\"",
+                     std::string(level.data(), level.size()), "\",\"message\":\"",
+                     JsonEscape(std::string(message.payload.data(), message.payload.size())), "\"",
+                     current_fields == nullptr ? "" : FormatJson(*current_fields), "}\n");
     out.append(line.data(), line.data() + line.size());
   }
 
@@ -95,52 +100,31 @@ void LogForProtobuf(google::protobuf::LogLevel level, const char* file, int line
       message);
 }
 
-// Returns the length of the UTF-8 character at text[at]; 0 if it is invalid.
-size_t CharacterLength(const std::string& text, size_t at) {
-  const auto byte = [&](size_t i) { return static_cast<unsigned char>(text[i]); };
-  const unsigned char lead = byte(at);
-  if (lead < 0x80) return 1;
-  const size_t length = lead >= 0xF0 ? 4 : lead >= 0xE0 ? 3 : 2;
-  if (lead < 0xC2 || lead > 0xF4 || at + length > text.size()) return 0;
-  for (size_t i = 1; i < length; ++i) {
-    if ((byte(at + i) & 0xC0) != 0x80) return 0;
-  }
-  const unsigned char second = byte(at + 1);
-  const bool overlong = (lead == 0xE0 && second < 0xA0) || (lead == 0xF0 && second < 0x90);
-  const bool surrogate = lead == 0xED && second >= 0xA0;
-  const bool too_big = lead == 0xF4 && second >= 0x90;
-  return overlong || surrogate || too_big ? 0 : length;
-}
-
 }  // namespace
 
 std::string JsonEscape(const std::string& text) {
   std::string out;
   out.reserve(text.size());
-  for (size_t i = 0; i < text.size();) {
-    const size_t length = CharacterLength(text, i);
-    const char c = text[i];
-    if (length == 0) {
-      out += "\\ufffd";
-    } else if (c == '"' || c == '\\') {
-      out += {'\\', c};
-    } else if (static_cast<unsigned char>(c) < 0x20 || c == 0x7F) {
-      char escape[8];
-      std::snprintf(escape, sizeof escape, "\\u%04x", static_cast<unsigned>(c));
-      out += escape;
-    } else {
-      out.append(text, i, length);
+  for (std::string_view rest = text; !rest.empty();) {
+    const auto valid = static_cast<size_t>(
+        google::protobuf::internal::UTF8SpnStructurallyValid({rest.data(), rest.size()}));
+    for (const char c : rest.substr(0, valid)) {
+      if (c == '"' || c == '\\') {
+        out += {'\\', c};
+      } else if (absl::ascii_iscntrl(static_cast<unsigned char>(c))) {
+        absl::StrAppend(&out, "\\u", absl::Hex(c, absl::kZeroPad4));
+      } else {
+        out += c;
+      }
     }
-    i += length == 0 ? 1 : length;
+    if (valid < rest.size()) out += "\\ufffd";
+    rest.remove_prefix(std::min(rest.size(), valid + 1));
   }
   return out;
 }
 
-LogField::LogField(const char* field, double number) : name(field), is_number(true) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3f", number);
-  value = text;
-}
+LogField::LogField(const char* field, double number)
+    : name(field), value(absl::StrFormat("%.3f", number)), is_number(true) {}
 
 std::optional<uint64_t> LineBudget::Spend(Clock::time_point now) {
   const std::lock_guard lock(mutex_);

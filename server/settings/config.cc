@@ -1,6 +1,7 @@
 #include "server/settings/config.h"
 
 #include <absl/status/status.h>
+#include <absl/strings/numbers.h>
 #include <absl/strings/str_cat.h>
 #include <unistd.h>
 
@@ -144,9 +145,7 @@ std::string LineOf(const std::string& path, size_t number) {
 // Returns an empty string if `text` is a number of seconds up to a day; NaN is not.
 std::string CheckSeconds(const std::string& text) {
   double seconds = -1;
-  const char* end = text.data() + text.size();
-  const auto [parsed, error] = std::from_chars(text.data(), end, seconds);
-  if (error == std::errc() && parsed == end && seconds >= 0 && seconds <= 86400) return "";
+  if (absl::SimpleAtod(text, &seconds) && seconds >= 0 && seconds <= 86400) return "";
   return absl::StrCat("\"", text, "\" is not a number of seconds from 0 to 86400");
 }
 
@@ -449,9 +448,7 @@ class Parser {
                 uint64_t most = kAnyNumber) {
     const auto check = [most](const std::string& text) -> std::string {
       uint64_t number = 0;
-      const char* end = text.data() + text.size();
-      const auto [parsed, error] = std::from_chars(text.data(), end, number);
-      if (error == std::errc() && parsed == end && number >= 1 && number <= most) return "";
+      if (absl::SimpleAtoi(text, &number) && number >= 1 && number <= most) return "";
       return absl::StrCat("\"", text, "\" is not a whole number from 1 to ", most);
     };
     Add(name, value, description)->check(CLI::Validator(check, ""))->type_name("N");
@@ -491,25 +488,20 @@ std::string DefaultDataDir(const Environment& environment) {
 // Checks combinations of settings of the store.
 absl::Status CheckStore(const Config& config) {
   const bool is_postgres = config.store == "postgres";
-  if (is_postgres && config.postgres_conninfo_file.empty()) {
-    return absl::InvalidArgumentError(
-        "--store postgres requires --postgres-conninfo-file, a file with the connection string");
-  }
-  if (is_postgres && config.durability != "sync") {
-    return absl::InvalidArgumentError(
-        "--durability relaxed requires --store rocksdb; with --store postgres, configure the "
-        "database: ALTER ROLE ... SET synchronous_commit = off");
-  }
-  if (config.take_over && !is_postgres) {
-    return absl::InvalidArgumentError("--take-over requires --store postgres");
-  }
   const bool is_many = config.postgres_servers == "many";
-  if (is_many && !is_postgres) {
-    return absl::InvalidArgumentError("--postgres-servers many requires --store postgres");
-  }
-  if (is_many && config.take_over) {
-    return absl::InvalidArgumentError(
-        "--take-over requires --postgres-servers one; with many, no server is replaced");
+  const std::pair<bool, const char*> errors[] = {
+      {is_postgres && config.postgres_conninfo_file.empty(),
+       "--store postgres requires --postgres-conninfo-file, a file with the connection string"},
+      {is_postgres && config.durability != "sync",
+       "--durability relaxed requires --store rocksdb; with --store postgres, configure the "
+       "database: ALTER ROLE ... SET synchronous_commit = off"},
+      {config.take_over && !is_postgres, "--take-over requires --store postgres"},
+      {is_many && !is_postgres, "--postgres-servers many requires --store postgres"},
+      {is_many && config.take_over,
+       "--take-over requires --postgres-servers one; with many, no server is replaced"},
+  };
+  for (const auto& [is_wrong, message] : errors) {
+    if (is_wrong) return absl::InvalidArgumentError(message);
   }
   return absl::OkStatus();
 }

@@ -7,7 +7,6 @@
 #include <chrono>
 #include <cmath>
 #include <cstdint>
-#include <cstring>
 #include <limits>
 #include <optional>
 
@@ -20,36 +19,23 @@
 namespace hulld::server {
 namespace {
 
-// Three numbers per point.
-std::vector<Vector> ToPoints(const google::protobuf::RepeatedField<double>& xyz) {
-  static_assert(sizeof(Vector) == 3 * sizeof(double));
-  std::vector<Vector> points(static_cast<size_t>(xyz.size()) / 3);
-  if (!points.empty())
-    std::memcpy(points.data()->data(), xyz.data(), points.size() * sizeof(Vector));
-  return points;
-}
-
-std::vector<Vector> ToPoints(const google::protobuf::RepeatedField<float>& xyz) {
-  std::vector<Vector> points;
-  points.reserve(static_cast<size_t>(xyz.size()) / 3);
-  const float* const end = xyz.data() + xyz.size();
-  for (const float* p = xyz.data(); p != end; p += 3) points.emplace_back(p[0], p[1], p[2]);
-  return points;
-}
-
+// Coordinates: doubles or floats, three per point.
 template <typename Coordinates>
 absl::StatusOr<std::vector<Vector>> DecodePoints(const Coordinates& coordinates, const char* field,
                                                  uint64_t max_points) {
+  static_assert(sizeof(Vector) == 3 * sizeof(double));
   if (coordinates.size() % 3 != 0) {
     return absl::InvalidArgumentError(
         absl::StrCat(field, " has ", coordinates.size(), " numbers; each point needs three"));
   }
-  const size_t count = coordinates.size() / 3;
+  const auto count = static_cast<size_t>(coordinates.size()) / 3;
   if (count > max_points) {
     return LimitExceeded(absl::StrCat("message contains ", count, " points"), max_points,
                          "max-points-per-chunk");
   }
-  return ToPoints(coordinates);
+  std::vector<Vector> points(count);
+  if (count > 0) std::copy(coordinates.begin(), coordinates.end(), points.front().data());
+  return points;
 }
 
 absl::Status OtherStore(const Store& store) {
@@ -143,12 +129,6 @@ Pose ReadPose(const v1::Pose& message) {
   return pose;
 }
 
-absl::StatusOr<Pose> DecodePose(const v1::Pose& message) {
-  const Pose pose = ReadPose(message);
-  HULLD_RETURN_IF_ERROR(ValidatePose(pose));
-  return pose;
-}
-
 absl::Status ValidateRadius(double radius) {
   if (IsValidRadius(radius)) return absl::OkStatus();
   return absl::InvalidArgumentError(absl::StrCat(" is ",
@@ -184,20 +164,6 @@ absl::StatusOr<Freshness> DecodeFreshness(const v1::Freshness& message, const St
     freshness.max_staleness = std::nullopt;
   }
   return freshness;
-}
-
-absl::StatusOr<Method> DecodeMethod(v1::Method method) {
-  switch (method) {
-    case v1::METHOD_UNSPECIFIED:
-    case v1::METHOD_CERTIFIED_SEARCH:
-      return Method::kCertifiedSearch;
-    case v1::METHOD_TEXTBOOK_SAT:
-      return Method::kTextbookSat;
-    default:
-      return absl::InvalidArgumentError(
-          absl::StrCat("method is ", static_cast<int>(method),
-                       "; use METHOD_CERTIFIED_SEARCH (the default) or METHOD_TEXTBOOK_SAT"));
-  }
 }
 
 }  // namespace hulld::server

@@ -44,10 +44,7 @@ std::optional<uint64_t> IfRevision(const Request& request) {
 // RESOURCE_EXHAUSTED: more than max_points (--max-points-per-chunk).
 absl::StatusOr<Chunk> DecodeChunk(const v1::AppendChunk& message, uint64_t max_points);
 
-// Decodes a pose; absent parts mean identity. INVALID_ARGUMENT names the coordinate, as in
-// "rotation.w".
-absl::StatusOr<Pose> DecodePose(const v1::Pose& message);
-// As DecodePose without validation.
+// Returns a pose without validation (ValidatePose); absent parts mean identity.
 Pose ReadPose(const v1::Pose& message);
 
 // Returns true if a radius of a placement or of a piece is valid: finite and at least 0.
@@ -76,9 +73,6 @@ inline void WritePose(const Pose& pose, size_t i, google::protobuf::RepeatedFiel
 // revision without a store ID. FAILED_PRECONDITION: the revision belongs to another store.
 absl::StatusOr<Freshness> DecodeFreshness(const v1::Freshness& message, const Store& store,
                                           SteadyClock::time_point began);
-
-// INVALID_ARGUMENT: unknown method.
-absl::StatusOr<Method> DecodeMethod(v1::Method method);
 
 }  // namespace hulld::server
 

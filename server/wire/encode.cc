@@ -2,8 +2,10 @@
 
 #include <absl/strings/str_cat.h>
 
+#include <array>
 #include <variant>
 
+#include "core/base/status_macros.h"
 #include "server/contract/error_info.h"
 #include "server/settings/config.h"
 
@@ -131,68 +133,38 @@ void EncodeDuration(std::chrono::nanoseconds duration, google::protobuf::Duratio
   message->set_nanos(static_cast<int32_t>(duration.count() % 1'000'000'000));
 }
 
+// The arrays of the next functions are in the order of the encoded enums.
 v1::Relation EncodeRelation(Relation relation) {
-  switch (relation) {
-    case Relation::kSeparated:
-      return v1::RELATION_SEPARATED;
-    case Relation::kTouching:
-      return v1::RELATION_TOUCHING;
-    case Relation::kOverlapping:
-      return v1::RELATION_OVERLAPPING;
-    case Relation::kWithinTolerance:
-      return v1::RELATION_WITHIN_TOLERANCE;
-  }
-  return v1::RELATION_UNSPECIFIED;
+  static constexpr std::array kRelations = {v1::RELATION_SEPARATED, v1::RELATION_TOUCHING,
+                                            v1::RELATION_OVERLAPPING,
+                                            v1::RELATION_WITHIN_TOLERANCE};
+  return kRelations[static_cast<size_t>(relation)];
 }
 
 v1::Rung EncodeRung(Rung rung) {
-  switch (rung) {
-    case Rung::kBounds:
-      return v1::RUNG_BOUNDS;
-    case Rung::kCached:
-      return v1::RUNG_CACHED;
-    case Rung::kFloatingPoint:
-      return v1::RUNG_FLOATING_POINT;
-    case Rung::kExact:
-      return v1::RUNG_EXACT;
-  }
-  return v1::RUNG_UNSPECIFIED;
+  static constexpr std::array kRungs = {v1::RUNG_BOUNDS, v1::RUNG_CACHED, v1::RUNG_FLOATING_POINT,
+                                        v1::RUNG_EXACT};
+  return kRungs[static_cast<size_t>(rung)];
 }
 
 v1::AxisKind EncodeAxisKind(AxisKind kind) {
-  switch (kind) {
-    case AxisKind::kFacetA:
-      return v1::AXIS_KIND_FACET_A;
-    case AxisKind::kFacetB:
-      return v1::AXIS_KIND_FACET_B;
-    case AxisKind::kEdgeEdge:
-      return v1::AXIS_KIND_EDGE_EDGE;
-    case AxisKind::kFlat:
-      return v1::AXIS_KIND_FLAT;
-    case AxisKind::kGeneral:
-      return v1::AXIS_KIND_GENERAL;
-  }
-  return v1::AXIS_KIND_UNSPECIFIED;
+  static constexpr std::array kKinds = {v1::AXIS_KIND_FACET_A, v1::AXIS_KIND_FACET_B,
+                                        v1::AXIS_KIND_EDGE_EDGE, v1::AXIS_KIND_FLAT,
+                                        v1::AXIS_KIND_GENERAL};
+  return kKinds[static_cast<size_t>(kind)];
 }
 
 v1::Durability EncodeDurability(Durability durability) {
-  switch (durability) {
-    case Durability::kMemory:
-      return v1::DURABILITY_MEMORY;
-    case Durability::kRelaxed:
-      return v1::DURABILITY_RELAXED;
-    case Durability::kSync:
-      return v1::DURABILITY_SYNC;
-  }
-  return v1::DURABILITY_UNSPECIFIED;
+  static constexpr std::array kDurabilities = {v1::DURABILITY_MEMORY, v1::DURABILITY_RELAXED,
+                                               v1::DURABILITY_SYNC};
+  return kDurabilities[static_cast<size_t>(durability)];
 }
 
 absl::Status EncodeAxis(const SeparatingAxis& axis, const Hull& a, const Hull& b,
                         v1::Axis* message) {
   EncodeVector(axis.direction, message->mutable_direction());
   message->set_kind(EncodeAxisKind(axis.kind));
-  absl::Status encoded = EncodeFeature(axis.feature_a, a, message->mutable_feature_a());
-  if (!encoded.ok()) return encoded;
+  HULLD_RETURN_IF_ERROR(EncodeFeature(axis.feature_a, a, message->mutable_feature_a()));
   return EncodeFeature(axis.feature_b, b, message->mutable_feature_b());
 }
 

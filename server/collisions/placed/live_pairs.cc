@@ -1,6 +1,7 @@
 #include "server/collisions/placed/live_pairs.h"
 
 #include <algorithm>
+#include <optional>
 
 #include "core/base/status_macros.h"
 #include "server/collisions/placed/scene_groups.h"
@@ -90,21 +91,16 @@ absl::Status LivePairs::Select(std::span<const uint32_t> changed, const Placemen
 }
 
 absl::Status LivePairs::SelectNeighbors(std::span<const uint32_t> changed) {
-  if (changed.size() <= kMaxCompared) {
-    for (const uint32_t a : changed) {
-      const Box box = GrownBy(boxes_[a], clearance_);
-      for (uint32_t b = 0; b < boxes_.size(); ++b) {
-        if (!box.Meets(boxes_[b])) continue;
-        HULLD_RETURN_IF_ERROR(SelectPair(a, b));
-      }
-    }
-    return absl::OkStatus();
-  }
-  const BoxTree tree(boxes_);
+  std::optional<BoxTree> tree;
+  if (changed.size() > kMaxCompared) tree.emplace(boxes_);
   std::vector<uint32_t> met;
   for (const uint32_t a : changed) {
+    const Box box = GrownBy(boxes_[a], clearance_);
     met.clear();
-    tree.AppendMeeting(GrownBy(boxes_[a], clearance_), 0, met);
+    if (tree.has_value()) tree->AppendMeeting(box, 0, met);
+    for (uint32_t b = 0; !tree.has_value() && b < boxes_.size(); ++b) {
+      if (box.Meets(boxes_[b])) met.push_back(b);
+    }
     for (const uint32_t b : met) {
       HULLD_RETURN_IF_ERROR(SelectPair(a, b));
     }

@@ -67,11 +67,6 @@ size_t ErrorBytes(const absl::Status& status) {
   return status.ok() ? 0 : kReasonBytes + status.message().size();
 }
 
-absl::Status CheckCount(int count, const char* of, uint64_t max_placements, const char* what) {
-  if (static_cast<uint64_t>(count) <= max_placements) return absl::OkStatus();
-  return LimitExceeded(absl::StrCat(what, " has ", count, of), max_placements, "max-placements");
-}
-
 // INVALID_ARGUMENT: the lists do not match.
 absl::Status CheckPacked(const v1::PackedPlacements& packed) {
   if (packed.poses_size() / kPoseNumbers != packed.hulls_size() ||
@@ -140,16 +135,16 @@ absl::StatusOr<PlacementTable> PlacementTable::Make(
     return absl::InvalidArgumentError(
         "placements and packed_placements are both set; set one of them");
   }
-  const absl::Status few = CheckCount(is_packed ? packed.hulls_size() : placements.size(),
-                                      " placements", max_placements, what);
-  if (!few.ok()) return few;
+  for (const auto& [count, of] :
+       {std::pair<int, const char*>{placements.size() + packed.hulls_size(), " placements"},
+        {packed.hull_ids_size(), " hull_ids"},
+        {packed.shape_sizes_size(), " shape_sizes"}}) {
+    if (static_cast<uint64_t>(count) <= max_placements) continue;
+    return LimitExceeded(absl::StrCat(what, " has ", count, of), max_placements, "max-placements");
+  }
   if (!is_packed) {
     return PlacementTable({placements.data(), static_cast<size_t>(placements.size())}, FieldInList,
                           caller);
-  }
-  for (const auto& [count, of] : {std::pair<int, const char*>{packed.hull_ids_size(), " hull_ids"},
-                                  {packed.shape_sizes_size(), " shape_sizes"}}) {
-    HULLD_RETURN_IF_ERROR(CheckCount(count, of, max_placements, what));
   }
   HULLD_RETURN_IF_ERROR(CheckPacked(packed));
   HULLD_ASSIGN_OR_RETURN(const std::vector<Vector> shape_points, DecodeShapePoints(packed));

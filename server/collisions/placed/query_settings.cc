@@ -30,9 +30,14 @@ constexpr OptionNames kFieldNames = {
 absl::StatusOr<QueryOptions> MakeQueryOptions(v1::Method method, const v1::Wanted& wanted,
                                               double tolerance, const Limits& limits,
                                               const CallLifetime& lifetime) {
-  HULLD_ASSIGN_OR_RETURN(const Method decoded, DecodeMethod(method));
+  const bool is_textbook = method == v1::METHOD_TEXTBOOK_SAT;
+  if (method != v1::METHOD_UNSPECIFIED && method != v1::METHOD_CERTIFIED_SEARCH && !is_textbook) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("method is ", static_cast<int>(method),
+                     "; use METHOD_CERTIFIED_SEARCH (the default) or METHOD_TEXTBOOK_SAT"));
+  }
   QueryOptions options;
-  options.method = decoded;
+  options.method = is_textbook ? Method::kTextbookSat : Method::kCertifiedSearch;
   options.want_axis = wanted.axis();
   options.want_analysis = wanted.analysis();
   options.want_certificate = wanted.certificate();

@@ -33,19 +33,14 @@ bool IsContact(v1::Relation relation) {
 
 // Returns the kind of the pair's event; UNSPECIFIED if the pair is unchanged.
 v1::CollisionEventKind KindOf(const LivePair& before, v1::Relation relation, bool is_within) {
-  switch (relation) {
-    case v1::RELATION_OVERLAPPING:
-      if (before.relation == relation) break;
-      return v1::COLLISION_EVENT_KIND_ENTER;
-    case v1::RELATION_TOUCHING:
-      if (before.relation == relation) break;
-      return v1::COLLISION_EVENT_KIND_TOUCH;
-    default:
-      if (IsContact(before.relation)) return v1::COLLISION_EVENT_KIND_EXIT;
-      if (is_within == before.is_within_clearance) break;
-      return is_within ? v1::COLLISION_EVENT_KIND_NEAR : v1::COLLISION_EVENT_KIND_FAR;
+  if (IsContact(relation)) {
+    if (relation == before.relation) return v1::COLLISION_EVENT_KIND_UNSPECIFIED;
+    return relation == v1::RELATION_OVERLAPPING ? v1::COLLISION_EVENT_KIND_ENTER
+                                                : v1::COLLISION_EVENT_KIND_TOUCH;
   }
-  return v1::COLLISION_EVENT_KIND_UNSPECIFIED;
+  if (IsContact(before.relation)) return v1::COLLISION_EVENT_KIND_EXIT;
+  if (is_within == before.is_within_clearance) return v1::COLLISION_EVENT_KIND_UNSPECIFIED;
+  return is_within ? v1::COLLISION_EVENT_KIND_NEAR : v1::COLLISION_EVENT_KIND_FAR;
 }
 
 }  // namespace
@@ -71,7 +66,7 @@ void CollisionWatch::StartWork() {
     if (is_short) return work(parts_.pool, &CollisionWatch::TakeMessage);
     return work(lane_, &CollisionWatch::TakeMessage);
   }
-  if (has_half_closed_) return End(absl::OkStatus());
+  if (has_half_closed_) return End(OrStopped(absl::OkStatus()));
   if (!std::exchange(has_changes_, false)) return;
   work(parts_.readers, &CollisionWatch::TakeChanges);
 }
@@ -102,9 +97,8 @@ void CollisionWatch::TakeMessage() {
 }
 
 absl::Status CollisionWatch::HandleMessage() {
-  const absl::Status in_order = CheckOrder(
-      request(), is_open_, "open was sent twice; start a new watch for other placements or pairs");
-  if (!in_order.ok()) return in_order;
+  HULLD_RETURN_IF_ERROR(CheckOrder(
+      request(), is_open_, "open was sent twice; start a new watch for other placements or pairs"));
   if (request().has_open()) return Prefixed("open: ", HandleOpen(*request().mutable_open()));
   ++messages_;
   return Prefixed(absl::StrCat("update ", messages_, ": "), HandleUpdate(request().update()));
@@ -119,12 +113,10 @@ absl::Status CollisionWatch::HandleOpen(v1::CollisionWatchOpen& open) {
   v1::Wanted wanted;
   if (open.has_clearance()) wanted.set_clearance(open.clearance());
   const Limits& limits = parts_.registry.limits();
-  HULLD_ASSIGN_OR_RETURN(QueryOptions options, MakeQueryOptions(v1::METHOD_UNSPECIFIED, wanted, 0,
-                                                                limits, call().lifetime()));
-  const absl::Status resting =
-      RefuseMotions(open.placements(), open.packed_placements(), "a watch");
-  if (!resting.ok()) return resting;
-  HULLD_ASSIGN_OR_RETURN(PlacementTable table,
+  HULLD_ASSIGN_OR_RETURN(
+      options_, MakeQueryOptions(v1::METHOD_UNSPECIFIED, wanted, 0, limits, call().lifetime()));
+  HULLD_RETURN_IF_ERROR(RefuseMotions(open.placements(), open.packed_placements(), "a watch"));
+  HULLD_ASSIGN_OR_RETURN(table_,
                          PlacementTable::Make(open.placements(), *open.mutable_packed_placements(),
                                               call().caller(), limits.max_placements, "the watch"));
   const bool has_groups = open.groups_size() > 0 || open.ignored_group_pairs_size() > 0 ||
@@ -133,12 +125,9 @@ absl::Status CollisionWatch::HandleOpen(v1::CollisionWatchOpen& open) {
     return absl::InvalidArgumentError(
         "pairs cannot be combined with groups or movers; list the pairs, or filter all pairs");
   }
-  absl::Status valid =
-      ValidatePairs(open.pairs(), table.size(), limits.max_pairs_per_batch, "the watch");
-  if (valid.ok()) valid = ValidateGroups(open, table.size());
-  if (!valid.ok()) return valid;
-  options_ = std::move(options);
-  table_ = std::move(table);
+  HULLD_RETURN_IF_ERROR(
+      ValidatePairs(open.pairs(), table_.size(), limits.max_pairs_per_batch, "the watch"));
+  HULLD_RETURN_IF_ERROR(ValidateGroups(open, table_.size()));
   table_.SortByHull();
   pairs_ = LivePairs(open, table_.size(), limits.max_pairs_per_batch);
   charge_.Set(table_.MemoryBytes() + pairs_.MemoryBytes());
@@ -149,15 +138,15 @@ absl::Status CollisionWatch::HandleOpen(v1::CollisionWatchOpen& open) {
     Locked([this] { has_changes_ = true; });
   };
   const auto should_stop = [this] { return call().ShouldStop(); };
-  absl::StatusOr<WatchedHulls::Round> round =
+  HULLD_ASSIGN_OR_RETURN(
+      WatchedHulls::Round round,
       hulls_.Open(table_.hull_ids(), on_ready,
-                  table_.LookupFor(options_, {kExpectedRounds * per_hull, true}), should_stop);
-  if (!round.ok()) return round.status();
+                  table_.LookupFor(options_, {kExpectedRounds * per_hull, true}), should_stop));
   Locked([this] { has_changes_ = true; });
-  table_.SetHulls(parts_.registry.store(), std::move(round->resolved), options_);
-  revision_ = round->revision;
-  new_piece_hulls_ = std::move(round->piece_hulls);
-  for (const size_t k : round->places) {
+  table_.SetHulls(parts_.store, std::move(round.resolved), options_);
+  revision_ = round.revision;
+  new_piece_hulls_ = std::move(round.piece_hulls);
+  for (const size_t k : round.places) {
     if (table_.hull(k).ok()) new_hulls_.push_back(k);
   }
   std::vector<uint32_t> all(table_.size());
@@ -256,7 +245,7 @@ void CollisionWatch::SendRound() {
     new_problems_.clear();
     if (answers_message_) call().EndMessage();
   }
-  EncodeHeader(parts_.registry.store(), revision_, reply_.mutable_header());
+  EncodeHeader(parts_.store, revision_, reply_.mutable_header());
   reply_.set_update(messages_);
   reply_.set_synced(is_complete);
   Locked([&] {
@@ -274,20 +263,18 @@ bool CollisionWatch::AddHulls() {
   while (next_hull_ < new_hulls_.size() || next_piece_hull_ < new_piece_hulls_.size() ||
          next_problem_ < new_problems_.size()) {
     if (reply_bytes_ >= Config::kReplyMessageBytes) return false;
+    const google::protobuf::Message* entry = nullptr;
     if (next_hull_ < new_hulls_.size()) {
-      v1::HullVersion* const version = reply_.add_hulls();
-      table_.EncodeHull(new_hulls_[next_hull_++], version);
-      reply_bytes_ += kEntryHeaderBytes + version->ByteSizeLong();
+      table_.EncodeHull(new_hulls_[next_hull_++], reply_.add_hulls());
+      entry = &*reply_.hulls().rbegin();
     } else if (next_piece_hull_ < new_piece_hulls_.size()) {
-      v1::HullVersion* const version = reply_.add_piece_hulls();
-      const HullRecord& hull = new_piece_hulls_[next_piece_hull_++];
-      EncodeVersion(parts_.registry.store(), hull, version);
-      reply_bytes_ += kEntryHeaderBytes + version->ByteSizeLong();
+      EncodeVersion(parts_.store, new_piece_hulls_[next_piece_hull_++], reply_.add_piece_hulls());
+      entry = &*reply_.piece_hulls().rbegin();
     } else {
-      v1::PlacementProblem* const problem = reply_.add_placement_problems();
-      table_.EncodeProblem(new_problems_[next_problem_++], problem);
-      reply_bytes_ += kEntryHeaderBytes + problem->ByteSizeLong();
+      table_.EncodeProblem(new_problems_[next_problem_++], reply_.add_placement_problems());
+      entry = &*reply_.placement_problems().rbegin();
     }
+    reply_bytes_ += kEntryHeaderBytes + entry->ByteSizeLong();
   }
   return true;
 }

@@ -12,7 +12,7 @@
 #include "core/query/collision.h"
 #include "hulld/v1/collision.pb.h"
 #include "server/call/queued_stream.h"
-#include "server/collisions/placed/collision_parts.h"
+#include "server/call/service_parts.h"
 #include "server/collisions/placed/live_pairs.h"
 #include "server/collisions/placed/placement_table.h"
 #include "server/collisions/watch/watched_hulls.h"
@@ -30,7 +30,7 @@ namespace hulld::server {
 class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchCollisionsResponse>,
                                             v1::WatchCollisionsRequest> {
  public:
-  CollisionWatch(CallContext& context, const CollisionParts& parts)
+  CollisionWatch(CallContext& context, const ServiceParts& parts)
       : ReadingStream(context, parts.admission, Rpc::kWatchCollisions),
         parts_(parts),
         lane_(parts.pool),
@@ -38,9 +38,6 @@ class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchC
         charge_(parts.registry.memory(), MemoryUse::kReading) {}
 
  private:
-  void Open() override {
-    Locked([] {});
-  }
   void OnDone() override;
 
   // The functions below require the mutex.
@@ -65,7 +62,7 @@ class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchC
   // Ends the task, and the call if `error` is not OK.
   void EndWork(const absl::Status& error);
 
-  const CollisionParts& parts_;
+  const ServiceParts& parts_;
   TaskPool::Lane lane_;
 
   // Guarded by the mutex.

@@ -48,10 +48,7 @@ absl::StatusOr<WatchedHulls::Round> WatchedHulls::Open(std::span<const std::stri
   }
   // No hull has the empty ID, so without placements the watch waits until the server drains.
   if (target.ids.empty()) target.ids.emplace();
-  absl::StatusOr<std::shared_ptr<Watch>> watch =
-      registry_.feed().Open(target, {}, std::move(on_ready));
-  if (!watch.ok()) return watch.status();
-  watch_ = *std::move(watch);
+  HULLD_ASSIGN_OR_RETURN(watch_, registry_.feed().Open(target, {}, std::move(on_ready)));
   Round round;
   HULLD_RETURN_IF_ERROR(Resolve(std::move(all), should_stop, &round));
   // Changes are applied here before the watch reports them. Inline shapes do not change.

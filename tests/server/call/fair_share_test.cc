@@ -36,7 +36,9 @@ class FairShare : public testing::Test {
     return "";
   }
 
-  void Begin(const Limits& limits) { admission_ = std::make_unique<Admission>(limits, metrics_); }
+  void Begin(const Limits& limits) {
+    admission_ = std::make_unique<Admission>(limits, metrics_, connections_);
+  }
 
   Metrics metrics_;
   ConnectionTable connections_{100, 100};
@@ -141,7 +143,6 @@ TEST_F(FairShare, AConnectionHasAWatchOfHealthOutsideOfAllShares) {
   limits.max_anonymous_calls = 8;
   limits.max_calls = 1;
   Begin(limits);
-  admission_->SetConnections(connections_);
   const std::string client = "ipv4:192.0.2.1";
   const auto peer = [](uint16_t port) {
     return PeerAddress::FromGrpc("ipv4:192.0.2.1:" + std::to_string(port));
@@ -163,7 +164,6 @@ TEST_F(FairShare, AConnectionHasAWatchOfHealthOutsideOfAllShares) {
 
 TEST_F(FairShare, CallsWithoutATokenKeepNoConnectionFromEviction) {
   Begin(Limits());
-  admission_->SetConnections(connections_);
   const auto peer = PeerAddress::FromGrpc("ipv4:192.0.2.1:1");
   connections_.Add(1, peer);
   EXPECT_EQ(Refusal(Rpc::kHealthWatch, "ipv4:192.0.2.1", peer), "");

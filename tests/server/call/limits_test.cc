@@ -404,7 +404,8 @@ TEST(AdmissionTest, EveryOverdueCallIsCancelledWhileACancelledOneStays) {
   Limits limits;
   limits.max_request_time = std::chrono::milliseconds(1);
   Metrics metrics;
-  Admission admission(limits, metrics);
+  ConnectionTable connections(1, 1);
+  Admission admission(limits, metrics, connections);
   UnansweredCalls calls;
   const auto admit = [&] {
     return std::make_unique<Admission::Ticket>(

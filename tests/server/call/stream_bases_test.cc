@@ -66,14 +66,13 @@ class TestQueue : public QueuedStream<WriteReactor, Batch> {
   using QueuedStream::finished;
   using QueuedStream::GrowLastWaiting;
   using QueuedStream::LastWaiting;
-  using QueuedStream::LastWaitingBytes;
   using QueuedStream::unsent_bytes;
 
  private:
   void Open() override { script_(std::static_pointer_cast<TestQueue>(shared_from_this())); }
   void StartWork() override {}
   bool IsWorking() const override { return working_; }
-  bool KeepsWaiting() const override { return keeps_waiting_; }
+  bool KeepsWaiting() override { return keeps_waiting_; }
 
   const Script script_;
   const std::shared_ptr<Signal> gone_;
@@ -157,7 +156,8 @@ class StreamBases : public ::testing::Test, public Collisions, public Hulls {
   }
 
   Metrics metrics_;
-  Admission admission_{Limits(), metrics_};
+  ConnectionTable connections_{1, 1};
+  Admission admission_{Limits(), metrics_, connections_};
   TestQueue::Script script_;
   std::shared_ptr<Signal> gone_ = std::make_shared<Signal>();
   size_t count_ = 0;
@@ -254,9 +254,9 @@ TEST_F(StreamBases, UnsentBytesIncludeQueuedAndWrittenReplies) {
         stream->Reply(2, 20);
         stream->Do([&] {
           ASSERT_NE(stream->LastWaiting(), nullptr);
-          stream->LastWaiting()->set_first_pair(3);
+          stream->LastWaiting()->reply.set_first_pair(3);
           stream->GrowLastWaiting(5);
-          EXPECT_EQ(stream->LastWaitingBytes(), 25u);
+          EXPECT_EQ(stream->LastWaiting()->bytes, 25u);
           EXPECT_EQ(stream->unsent_bytes(), 125u);
         });
         stream->SetEnd(absl::OkStatus());
@@ -274,11 +274,11 @@ TEST_F(StreamBases, RepliesAreCombinedUntilOneFollowsOrTheStreamEnds) {
         stream->Reply(1, 100);
         stream->Do([&] {
           ASSERT_NE(stream->LastWaiting(), nullptr);
-          stream->LastWaiting()->set_first_pair(2);
+          stream->LastWaiting()->reply.set_first_pair(2);
         });
         // Only the last one waits behind another.
         stream->Reply(3, 10);
-        stream->Do([&] { EXPECT_EQ(stream->LastWaitingBytes(), 10u); });
+        stream->Do([&] { EXPECT_EQ(stream->LastWaiting()->bytes, 10u); });
         stream->SetEnd(absl::OkStatus());
       },
       &numbers);
