@@ -115,7 +115,7 @@ UnaryReactor* BodyService::ListBodies(CallContext* context, const Bytes* request
 UnaryReactor* BodyService::DeleteBody(CallContext* context, const Bytes* request, Bytes* response) {
   return DeleteCall::Start(
       *context, admission_, Rpc::kDeleteBody, {request, response}, [this](DeleteCall* call) {
-        EndDeleted(registry_, call, registry_.bodies(), "body", call->request().body_id());
+        EndDeleted(registry_, call, "body", call->request().body_id());
       });
 }
 
@@ -124,7 +124,7 @@ void BodyService::Put(PutCall* call) {
   absl::StatusOr<StoredBody> body =
       DecodeBody(call->request(), call->call().caller(), registry_.limits().max_pieces_per_body);
   if (!body.ok()) return call->End(body.status());
-  registry_.bodies().Put(
+  registry_.changes().PutBody(
       *std::move(body), IfRevision(call->request()),
       [this, call](const absl::StatusOr<PutBodyResult>& result) {
         if (!result.ok()) return call->End(result.status());
@@ -149,7 +149,7 @@ absl::Status BodyService::Get(const v1::GetBodyRequest& request, const Call& cal
   const std::string& id = request.body_id();
   HULLD_RETURN_IF_ERROR(CheckHullId(call.caller(), id, "body_id"));
   const FoundBodies found =
-      registry_.bodies().Find(std::span(&id, 1), [&call] { return call.ShouldStop(); });
+      registry_.records().FindBodies(std::span(&id, 1), [&call] { return call.ShouldStop(); });
   if (!found.status.ok()) return found.status;
   const std::shared_ptr<const Body>& body = found.bodies.front();
   if (body == nullptr) return BodyNotFound(id);

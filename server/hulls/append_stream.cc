@@ -42,7 +42,7 @@ void AppendStream::OnDone() {
   Locked([this] {
     if (!session_.has_value()) return;
     LogApplied();
-    registry_.hulls().CloseAppend(*session_);
+    registry_.changes().CloseAppend(*session_);
   });
 }
 
@@ -90,7 +90,7 @@ void AppendStream::HandleOpen(const v1::AppendOpen& open) {
     self.Locked([&] { self.Fail(reason); });
   };
   hull_id_ = open.hull_id();
-  registry_.hulls().OpenAppend(
+  registry_.changes().OpenAppend(
       open.hull_id(), writer_id_, open.create_if_absent(), on_gone,
       [this, self = shared_from_this()](const absl::StatusOr<OpenResult>& opened) {
         Locked([&] {
@@ -131,7 +131,7 @@ void AppendStream::HandleChunk(const v1::AppendChunk& message) {
   const uint64_t sequence = chunk->sequence;
   const uint64_t number = results_.Number();
   const auto arrival = std::chrono::steady_clock::now();
-  registry_.hulls().Append(
+  registry_.changes().Append(
       *session_, *std::move(chunk), [this, self] { return call().ShouldStop(); },
       [this, self] { Locked([this] { --unbuilt_; }); },
       [this, self, sequence, number, arrival](const absl::StatusOr<ChunkResult>& result) {

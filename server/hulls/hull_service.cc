@@ -73,7 +73,7 @@ UnaryReactor* HullService::ListHulls(CallContext* context, const Bytes* request,
 UnaryReactor* HullService::DeleteHull(CallContext* context, const Bytes* request, Bytes* response) {
   return DeleteCall::Start(
       *context, admission_, Rpc::kDeleteHull, {request, response}, [this](DeleteCall* call) {
-        EndDeleted(registry_, call, registry_.hulls(), "hull", call->request().hull_id());
+        EndDeleted(registry_, call, "hull", call->request().hull_id());
       });
 }
 
@@ -87,7 +87,7 @@ void HullService::Create(CreateCall* call) {
   if (absl::Status s = CheckHullId(call->call().caller(), request.hull_id(), "hull_id"); !s.ok()) {
     return call->End(s);
   }
-  registry_.hulls().Create(
+  registry_.changes().Create(
       request.hull_id(), request.if_absent(),
       [this, call](const absl::StatusOr<PutHullResult>& created) {
         if (!created.ok()) return call->End(created.status());

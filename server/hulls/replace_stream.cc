@@ -112,7 +112,7 @@ void ReplaceStream::Commit() {
     *response_ = SerializeReply(response);
     FinishCall(absl::OkStatus());
   };
-  registry_.hulls().Replace(std::move(replacement_), done);
+  registry_.changes().Replace(std::move(replacement_), done);
 }
 
 }  // namespace hulld::server

@@ -97,12 +97,12 @@ ReadPlan PlanOf(const PlacedLookup& lookup) {
 }
 
 // Returns the bodies among the IDs; empty if there are none. Omits IDs that cannot be read now: the
-// subsequent hull lookup reports their errors. Otherwise as BodyRegistry::Find. WouldWait also if
+// subsequent hull lookup reports their errors. Otherwise as RecordReader::FindBodies. WouldWait also if
 // there are bodies, whose boxes must be built.
 absl::StatusOr<Bodies> BodiesAmong(Registry& registry, std::span<const std::string> ids,
                                    const std::function<bool()>& should_stop, bool may_wait) {
   if (!registry.has_bodies()) return Bodies();
-  FoundBodies found = registry.bodies().Find(ids, should_stop, may_wait);
+  FoundBodies found = registry.records().FindBodies(ids, should_stop, may_wait);
   if (!found.status.ok() && !absl::IsUnavailable(found.status)) return found.status;
   if (std::ranges::all_of(found.bodies, [](const auto& body) { return body == nullptr; })) {
     return Bodies();

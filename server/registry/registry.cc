@@ -4,7 +4,6 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <memory>
 #include <mutex>
 #include <utility>
 
@@ -18,16 +17,13 @@ Registry::Registry(Store& store, const Limits& limits, TaskPool& writers,
     : state_(store, limits, preparers),
       committer_(store, state_.mutex),
       loaders_(std::in_place, std::max(1, DefaultThreads() - 1), loaders),
-      barrier_(store.peers() == nullptr
-                   ? std::make_unique<ReadBarrier>(state_, committer_)
-                   : std::make_unique<PeerSync>(state_, committer_, *store.peers())),
-      records_(state_, committer_, *barrier_, *loaders_),
-      reader_(state_, *barrier_, records_, *loaders_),
-      bodies_(state_, committer_, *barrier_, records_),
-      changes_(state_, committer_, *barrier_, records_, writers) {}
+      barrier_(state_, committer_),
+      records_(state_, committer_, barrier_, *loaders_),
+      reader_(state_, barrier_, records_, *loaders_),
+      changes_(state_, committer_, barrier_, records_, writers) {}
 
 Registry::~Registry() {
-  barrier_->End();
+  barrier_.End();
   state_.EndPreparing();
   // Its thread applies peer changes to the parts that are destroyed below.
   committer_.End();
@@ -59,7 +55,7 @@ absl::Status Registry::Load() {
     });
     if (!status.ok()) return status;
   }
-  return barrier_->Begin(locked, {&changes_, &records_});
+  return barrier_.Begin(locked, {&changes_, &records_});
 }
 
 absl::StatusOr<Resolved> Registry::Resolve(std::span<const std::string> ids,

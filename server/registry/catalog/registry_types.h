@@ -101,7 +101,7 @@ struct Replacement {
   // Sums over the points passed to the builder.
   PointCounts counts;
   // Vertices and live hull of the builder, for the store and for readers; set by
-  // HullChanges::Replace.
+  // LocalChanges::Replace.
   std::vector<Vector> vertices = {};
   std::shared_ptr<LiveHull> live = nullptr;
 };

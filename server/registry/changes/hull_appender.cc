@@ -10,12 +10,12 @@
 #include "server/contract/status_map.h"
 #include "server/contract/stopped_call.h"
 #include "server/registry/catalog/registered_hull.h"
-#include "server/registry/changes/hull_changes.h"
+#include "server/registry/changes/local_changes.h"
 #include "server/registry/memory/hull_loader.h"
 
 namespace hulld::server {
 
-struct HullChanges::OpenRequest {
+struct LocalChanges::OpenRequest {
   std::string hull_id;
   std::string writer_id;
   bool create_if_absent = false;
@@ -28,10 +28,10 @@ struct HullChanges::OpenRequest {
 };
 
 // Result of checking a chunk that is allowed.
-enum class HullChanges::Verdict { kNew, kAlreadyApplied };
+enum class LocalChanges::Verdict { kNew, kAlreadyApplied };
 
 // A chunk added to the builder, and its change to commit.
-struct HullChanges::BuiltChunk {
+struct LocalChanges::BuiltChunk {
   Change change;
   PointCounts counts;
   // Prefix of the LiveHull that includes this chunk.
@@ -89,7 +89,7 @@ void AnswerChunk(Locked& locked, const Reply<ChunkResult>& done, uint64_t sequen
 
 }  // namespace
 
-void HullChanges::OpenAppend(const std::string& id, const std::string& writer_id,
+void LocalChanges::OpenAppend(const std::string& id, const std::string& writer_id,
                              bool create_if_absent,
                              std::function<void(const absl::Status&)> on_gone,
                              Reply<OpenResult> done, ClientId client) {
@@ -99,7 +99,7 @@ void HullChanges::OpenAppend(const std::string& id, const std::string& writer_id
   barrier_.WhenFresh(request->done, [=, this](Locked&) { RunOpen(request); });
 }
 
-void HullChanges::RunOpen(const std::shared_ptr<OpenRequest>& request) {
+void LocalChanges::RunOpen(const std::shared_ptr<OpenRequest>& request) {
   writers_.Submit(
       [this, request] {
         Locked locked(state_.mutex);
@@ -109,7 +109,7 @@ void HullChanges::RunOpen(const std::shared_ptr<OpenRequest>& request) {
 }
 
 // Runs on a thread of `writers_`. May release the mutex to query the store.
-void HullChanges::OpenLocked(Locked& locked, const std::shared_ptr<OpenRequest>& request) {
+void LocalChanges::OpenLocked(Locked& locked, const std::shared_ptr<OpenRequest>& request) {
   const auto refuse = [request](Locked& later, const absl::Status& status) {
     Answer(later, request->done, status);
   };
@@ -153,7 +153,7 @@ void HullChanges::OpenLocked(Locked& locked, const std::shared_ptr<OpenRequest>&
   OpenSession(locked, hull, request, *last);
 }
 
-void HullChanges::OpenSession(Locked& locked, const HullPointer& hull,
+void LocalChanges::OpenSession(Locked& locked, const HullPointer& hull,
                               const std::shared_ptr<OpenRequest>& request, uint64_t last_sequence) {
   HULLD_CHECK(hull->state.visible());
   OpenResult result;
@@ -166,7 +166,7 @@ void HullChanges::OpenSession(Locked& locked, const HullPointer& hull,
 }
 
 // Returns the last committed sequence of a writer. May release the mutex to query the store.
-absl::StatusOr<uint64_t> HullChanges::CommittedSequence(Locked& locked, RegisteredHull& hull,
+absl::StatusOr<uint64_t> LocalChanges::CommittedSequence(Locked& locked, RegisteredHull& hull,
                                                         const std::string& writer_id) {
   if (const auto known = hull.CommittedSequence(writer_id)) return *known;
   if (!state_.store.keeps_hulls() || hull.committed().writer_count == 0) return 0;
@@ -196,7 +196,7 @@ absl::StatusOr<uint64_t> HullChanges::CommittedSequence(Locked& locked, Register
   return *sequence;
 }
 
-void HullChanges::CloseAppend(const AppendSession& session) {
+void LocalChanges::CloseAppend(const AppendSession& session) {
   Locked locked(state_.mutex);
   RegisteredHull& hull = *session.hull;
   hull.watches.erase(session.watch);
@@ -207,7 +207,7 @@ void HullChanges::CloseAppend(const AppendSession& session) {
   state_.hulls.RestSoon(locked, hull);
 }
 
-void HullChanges::Append(const AppendSession& session, Chunk chunk,
+void LocalChanges::Append(const AppendSession& session, Chunk chunk,
                          std::function<bool()> should_stop, std::function<void()> on_built,
                          Reply<ChunkResult> done) {
   Locked locked(state_.mutex);
@@ -218,7 +218,7 @@ void HullChanges::Append(const AppendSession& session, Chunk chunk,
   Advance(locked, session.hull);
 }
 
-void HullChanges::RunNextChunk(const HullPointer& hull) {
+void LocalChanges::RunNextChunk(const HullPointer& hull) {
   Locked locked(state_.mutex);
   HULLD_CHECK(hull->state.work() == HullState::Work::kScheduled && !hull->chunks.empty());
   PendingChunk pending = std::move(hull->chunks.front());
@@ -234,7 +234,7 @@ void HullChanges::RunNextChunk(const HullPointer& hull) {
 }
 
 // Refuses the chunks of a hull that can no longer grow.
-void HullChanges::RefuseChunks(const HullPointer& hull) {
+void LocalChanges::RefuseChunks(const HullPointer& hull) {
   Locked locked(state_.mutex);
   HULLD_CHECK(hull->state.gone() || hull->state.damaged());
   const absl::Status reason = hull->state.gone() ? GoneWhileStreaming(*hull) : hull->state.damage();
@@ -246,7 +246,7 @@ void HullChanges::RefuseChunks(const HullPointer& hull) {
 
 // Answers a chunk, or submits its change, whose completion answers it. Releases the mutex while
 // building.
-void HullChanges::ApplyChunk(Locked& locked, const HullPointer& hull, PendingChunk& pending) {
+void LocalChanges::ApplyChunk(Locked& locked, const HullPointer& hull, PendingChunk& pending) {
   const uint64_t sequence = pending.chunk.sequence;
   absl::StatusOr<Verdict> verdict = CheckChunk(locked, *hull, pending);
   // Without a commit, no store write detects a stale state, so compare explicitly.
@@ -281,7 +281,7 @@ void HullChanges::ApplyChunk(Locked& locked, const HullPointer& hull, PendingChu
 }
 
 // Checks a chunk before building. May release the mutex to query the store.
-absl::StatusOr<HullChanges::Verdict> HullChanges::CheckChunk(Locked& locked, RegisteredHull& hull,
+absl::StatusOr<LocalChanges::Verdict> LocalChanges::CheckChunk(Locked& locked, RegisteredHull& hull,
                                                              const PendingChunk& pending) {
   if (hull.state.gone()) return GoneWhileStreaming(hull);
   const Chunk& chunk = pending.chunk;
@@ -311,7 +311,7 @@ absl::StatusOr<HullChanges::Verdict> HullChanges::CheckChunk(Locked& locked, Reg
 
 // Adds a chunk to its hull's builder, without the mutex. On success `head` and the writer's
 // sequence include it.
-absl::StatusOr<HullChanges::BuiltChunk> HullChanges::Build(Locked& locked, RegisteredHull& hull,
+absl::StatusOr<LocalChanges::BuiltChunk> LocalChanges::Build(Locked& locked, RegisteredHull& hull,
                                                            PendingChunk& pending) {
   // A reader may have found damage during a release of the mutex.
   if (hull.state.damaged()) return hull.state.damage();
@@ -351,7 +351,7 @@ absl::StatusOr<HullChanges::BuiltChunk> HullChanges::Build(Locked& locked, Regis
 
 // Returns the LiveHull to append to. Releases the mutex to read it from the store if it is not in
 // memory. A writer does not wait for a reader that loads the same hull; the first to finish wins.
-absl::StatusOr<std::shared_ptr<LiveHull>> HullChanges::LiveForWriter(Locked& locked,
+absl::StatusOr<std::shared_ptr<LiveHull>> LocalChanges::LiveForWriter(Locked& locked,
                                                                      RegisteredHull& hull) {
   if (hull.live() != nullptr) return hull.live();
   HULLD_CHECK(hull.state.in_flight() == 0);
@@ -382,7 +382,7 @@ absl::StatusOr<std::shared_ptr<LiveHull>> HullChanges::LiveForWriter(Locked& loc
 // Adds a chunk's points to the lent builder, after its backlog; builds the builder from the
 // committed points if it is missing. Appends the new vertices to the LiveHull and fills the change
 // with the data to store. Called without the mutex.
-absl::StatusOr<PointCounts> HullChanges::AddPoints(PendingChunk& pending, LentBuilder& lent,
+absl::StatusOr<PointCounts> LocalChanges::AddPoints(PendingChunk& pending, LentBuilder& lent,
                                                    LiveHull& live, BuiltChunk& built) {
   Change& change = built.change;
   std::unique_ptr<HullBuilder>& builder = lent.builder;
@@ -416,7 +416,7 @@ absl::StatusOr<PointCounts> HullChanges::AddPoints(PendingChunk& pending, LentBu
 }
 
 // Returns the writer's status for a failure of AddPoints.
-absl::Status HullChanges::WhyNotBuilt(RegisteredHull& hull, const absl::Status& cause) {
+absl::Status LocalChanges::WhyNotBuilt(RegisteredHull& hull, const absl::Status& cause) {
   if (absl::IsDataLoss(cause)) state_.MarkDamaged(hull, cause);
   if (!absl::IsResourceExhausted(cause)) return cause;
   return LimitExceeded(
@@ -424,7 +424,7 @@ absl::Status HullChanges::WhyNotBuilt(RegisteredHull& hull, const absl::Status& 
       state_.limits.max_vertices_per_hull, "max-vertices-per-hull");
 }
 
-void HullChanges::SubmitChunk(Locked& locked, const HullPointer& hull, PendingChunk& pending,
+void LocalChanges::SubmitChunk(Locked& locked, const HullPointer& hull, PendingChunk& pending,
                               BuiltChunk built) {
   // If a peer server may commit first, keeps the chunk for a retry.
   std::shared_ptr<PendingChunk> kept;

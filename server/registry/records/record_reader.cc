@@ -130,6 +130,8 @@ absl::Status RecordReader::AwaitKnown(Locked& locked, std::span<const std::strin
   return awaited->status;
 }
 
+// As AwaitKnown for the unknown ones among `ids`, which must include the first.
+// RESOURCE_EXHAUSTED: readers exceed their share of --memory-limit.
 absl::Status RecordReader::AwaitMissing(Locked& locked, std::span<const std::string> ids,
                                         const std::function<bool()>& should_stop) {
   HULLD_RETURN_IF_ERROR(state_.memory.Check(locked, MemoryUse::kReading));
@@ -140,6 +142,31 @@ absl::Status RecordReader::AwaitMissing(Locked& locked, std::span<const std::str
   const absl::Status read = AwaitKnown(locked, missing, should_stop);
   if (Stopped(should_stop)) return Cancelled();
   return read;
+}
+
+// Looks up kMaxLookupsPerHold bodies per hold and reads the unknown ones together. A reader of
+// many bodies may evict them again, so bodies already found are not looked up again.
+FoundBodies RecordReader::FindBodies(std::span<const std::string> ids,
+                                     const std::function<bool()>& should_stop, bool may_wait) {
+  Locked locked(state_.mutex);
+  FoundBodies found;
+  found.bodies.resize(ids.size());
+  for (size_t first = 0; first < ids.size(); first += kMaxLookupsPerHold) {
+    if (first > 0) locked.Yield();
+    const size_t end = std::min<size_t>(first + kMaxLookupsPerHold, ids.size());
+    for (size_t i = first; i < end; ++i) {
+      while (found.status.ok() && !state_.IsKnown(ids[i])) {
+        found.status = may_wait
+                           ? AwaitMissing(locked, ids.subspan(i, end - i), should_stop)
+                           : WouldWait();
+      }
+      // A body that could not be read may be known by now.
+      found.bodies[i] = state_.FindBody(ids[i]);
+      locked.NoteLookup();
+    }
+  }
+  found.store_revision = state_.revision();
+  return found;
 }
 
 // Releases the mutex during the read. The readings may end later than this call.

@@ -76,10 +76,12 @@ class RecordReader : public PeerChangeListener, public PageSource {
   // returned true. OK: the ID was known at some time since. Requires at least one ID.
   absl::Status AwaitKnown(Locked& locked, std::span<const std::string* const> ids,
                           const std::function<bool()>& should_stop);
-  // As AwaitKnown for the unknown ones among `ids`, which must include the first.
-  // RESOURCE_EXHAUSTED: readers exceed their share of --memory-limit.
-  absl::Status AwaitMissing(Locked& locked, std::span<const std::string> ids,
-                            const std::function<bool()>& should_stop);
+  // Loads unknown records from the store, so it must not run on a gRPC thread. Status: UNAVAILABLE:
+  // the store cannot be read; CANCELLED: should_stop returned true; RESOURCE_EXHAUSTED: a read is
+  // needed, and readers exceed their share of --memory-limit. Cost: O(log n) each, and one store
+  // query per kMaxLookupsPerHold; the mutex is released in between. may_wait: as in ReadPlan.
+  FoundBodies FindBodies(std::span<const std::string> ids,
+                         const std::function<bool()>& should_stop = {}, bool may_wait = true);
 
   // Ends the read of the ID; its tasks look the ID up again.
   void OnPeerChange(Locked& locked, const std::string& id, const HullPointer& hull) override;
@@ -112,6 +114,8 @@ class RecordReader : public PeerChangeListener, public PageSource {
   // Called with the registry's mutex held, with the records valid from then on, or an error.
   using FoundTaker = std::function<void(Locked&, const absl::StatusOr<FoundRecords>&)>;
 
+  absl::Status AwaitMissing(Locked& locked, std::span<const std::string> ids,
+                            const std::function<bool()>& should_stop);
   void RunWhenReady(Locked& locked, const std::shared_ptr<const ReadyTask>& ready);
   void ReadDue();
   void ReadRecords(Locked& locked, const Readings& readings);

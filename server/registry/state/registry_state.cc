@@ -85,6 +85,12 @@ absl::Status RegistryState::NoSuchHull(const std::string& id) const {
       v1::ERROR_REASON_HULL_NOT_FOUND, {{"hull_id", id}});
 }
 
+absl::Status RegistryState::NoSuchBody(const std::string& id) const {
+  if (!hulls.contains(id)) return BodyNotFound(id);
+  return WithReason(absl::NotFoundError(absl::StrCat("\"", id, "\" is a hull, not a body")),
+                    v1::ERROR_REASON_BODY_NOT_FOUND, {{"body_id", id}});
+}
+
 void RegistryState::AddStored(const std::string& id, const absl::StatusOr<StoredHull>& stored) {
   if (stored.ok()) {
     hulls.AddResting(*stored);

@@ -287,7 +287,7 @@ TEST_F(RegistryInterleaving, AHullThatIsReplacedWhileItIsReadIsTheNewOne) {
   replacement.builder = std::make_shared<HullBuilder>();
   replacement.counts = *replacement.builder->Add(CubeCorners(5, 1));
   ASSERT_TRUE(DurableRegistry::Wait<PutHullResult>([&](Reply<PutHullResult> done) {
-                registry_.hulls().Replace(std::move(replacement), std::move(done));
+                registry_.changes().Replace(std::move(replacement), std::move(done));
               }).ok());
   gate.Open();
   const auto resolved = reader.get();
@@ -338,19 +338,19 @@ TEST_F(RegistryInterleaving, PointsThatMakeAnotherHullAreDamage) {
 TEST_F(RegistryInterleaving, ASequenceThatIsReadWhileAnotherIsCommittedIsTheNewer) {
   const AppendSession first = Open("h", "w");
   ASSERT_TRUE(Append(first, 1, {{0, 0, 0}}).ok());
-  registry_.hulls().CloseAppend(first);
+  registry_.changes().CloseAppend(first);
   store_.after_load_sequence.Set([this] {
     const OpenResult other = OpenResultOf("h", "w");
     EXPECT_EQ(other.last_sequence, 1);
     EXPECT_TRUE(Append(other.session, 2, {{1, 0, 0}}).ok());
-    registry_.hulls().CloseAppend(other.session);
+    registry_.changes().CloseAppend(other.session);
   });
   const OpenResult opened = OpenResultOf("h", "w");
   EXPECT_EQ(opened.last_sequence, 2);
   const absl::StatusOr<ChunkResult> repeated = Append(opened.session, 2, {{1, 0, 0}});
   ASSERT_TRUE(repeated.ok()) << repeated.status();
   EXPECT_TRUE(repeated->already_applied);
-  registry_.hulls().CloseAppend(opened.session);
+  registry_.changes().CloseAppend(opened.session);
 }
 
 // The chunk is queued on a thread, not yet started, when the batch before it fails. The store has
@@ -358,14 +358,14 @@ TEST_F(RegistryInterleaving, ASequenceThatIsReadWhileAnotherIsCommittedIsTheNewe
 TEST_F(RegistryInterleaving, ASequenceThatADeletionTookAwayIsNotThatOfTheHull) {
   const OpenResult first = OpenResultOf("h", "w");
   ASSERT_TRUE(Append(first.session, 1, CubeCorners()).ok());
-  registry_.hulls().CloseAppend(first.session);
+  registry_.changes().CloseAppend(first.session);
   // One of two threads is busy, so tasks submitted after the opening run after it.
   Gate busy, reads, committed;
   writers_.Submit([&] { busy.Stop(); });
   busy.WaitUntilReached();
   store_.before_load_sequence.Set([&] { reads.Stop(); });
   std::promise<absl::StatusOr<OpenResult>> opened;
-  registry_.hulls().OpenAppend(
+  registry_.changes().OpenAppend(
       "h", "w", true, [](const absl::Status&) {},
       [&](absl::StatusOr<OpenResult> result) { opened.set_value(std::move(result)); });
   reads.WaitUntilReached();

@@ -97,7 +97,7 @@ TEST(RegistryListing, InsidePointsInFlightAreSeenByAllReadsOrNone) {
   ASSERT_EQ(page->entries.size(), 1);
   EXPECT_LE(page->entries[0].record.counts.received, view->record.counts.received);
   EXPECT_TRUE(appended.get().ok());
-  hulls.registry().hulls().CloseAppend(writer->session);
+  hulls.registry().changes().CloseAppend(writer->session);
 }
 
 }  // namespace registry_listing_test

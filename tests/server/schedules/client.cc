@@ -152,7 +152,7 @@ void Client::Create() {
   };
   Await<PutHullResult>(
       [&](Reply<PutHullResult> done) {
-        simulation_.registry.hulls().Create(HullName(call.hull), if_absent, std::move(done));
+        simulation_.registry.changes().Create(HullName(call.hull), if_absent, std::move(done));
       },
       check);
 }
@@ -175,7 +175,7 @@ void Client::Delete() {
   };
   Await<uint64_t>(
       [&](Reply<uint64_t> done) {
-        simulation_.registry.hulls().Delete(HullName(call.hull), call.if_revision, std::move(done));
+        simulation_.registry.changes().Delete("hull", HullName(call.hull), call.if_revision, std::move(done));
       },
       check);
 }
@@ -211,7 +211,7 @@ void Client::Replace() {
   };
   Await<PutHullResult>(
       [&](Reply<PutHullResult> done) {
-        simulation_.registry.hulls().Replace(std::move(replacement), std::move(done));
+        simulation_.registry.changes().Replace(std::move(replacement), std::move(done));
       },
       check);
 }

@@ -44,17 +44,17 @@ class PostgresRecords : public PostgresTest {
     body.hull_ids = {"a"};
     body.pieces.assign(pieces, StoredPiece());
     return PostgresRegistry::Wait<PutBodyResult>([&](Reply<PutBodyResult> done) {
-      server.registry().bodies().Put(std::move(body), std::nullopt, std::move(done));
+      server.registry().changes().PutBody(std::move(body), std::nullopt, std::move(done));
     });
   }
   static absl::StatusOr<uint64_t> DeleteBody(PostgresRegistry& server, const std::string& id) {
     return PostgresRegistry::Wait<uint64_t>([&](Reply<uint64_t> done) {
-      server.registry().bodies().Delete(id, std::nullopt, std::move(done));
+      server.registry().changes().Delete("body", id, std::nullopt, std::move(done));
     });
   }
   // DATA_LOSS or NOT_FOUND if the record is unavailable.
   static absl::StatusOr<BodyRecord> FindBody(PostgresRegistry& server, const std::string& id) {
-    const FoundBodies found = server.registry().bodies().Find(std::span(&id, 1));
+    const FoundBodies found = server.registry().records().FindBodies(std::span(&id, 1));
     if (!found.status.ok()) return found.status;
     const std::shared_ptr<const Body>& body = found.bodies.front();
     if (body == nullptr) return absl::NotFoundError("none");
@@ -351,7 +351,7 @@ TEST_F(PostgresRecords, AWatchReportsExistingAndDeletedRecords) {
   ASSERT_TRUE(PutBody(*hulls_, "b").ok());
   // Evicts the cached knowledge of these IDs.
   for (int i = 0; i < 100; ++i) hulls_->View(absl::StrCat("none-", i)).IgnoreError();
-  EXPECT_FALSE(registry.bodies().Find(std::vector<std::string>{"b"}, {}, false).status.ok());
+  EXPECT_FALSE(registry.records().FindBodies(std::vector<std::string>{"b"}, {}, false).status.ok());
   const auto told = [&](uint64_t after, bool bodies = false) {
     std::vector<std::pair<std::string, bool>> events;
     const WatchTarget target{.bodies = bodies};
