@@ -123,12 +123,12 @@ absl::StatusOr<std::vector<Vector>> RocksDbStore::LoadVertices(const StoredHull&
 // Most hulls are one value: a base with a single part, or a single delta. Other hulls and damaged
 // values are read one by one, which yields the precise error.
 std::vector<absl::StatusOr<std::vector<Vector>>> RocksDbStore::LoadVerticesOfEach(
-    std::span<const StoredHull* const> hulls) {
+    std::span<const StoredHull> hulls) {
   std::vector<std::string> keys;
   std::vector<size_t> hull_of;
   for (size_t i = 0; i < hulls.size(); ++i) {
-    const HullRecord& record = hulls[i]->record;
-    const VertexLayout& layout = hulls[i]->layout;
+    const HullRecord& record = hulls[i].record;
+    const VertexLayout& layout = hulls[i].layout;
     const bool has_one_part = layout.base_vertices > 0 && layout.base_vertices <= kBasePartVertices;
     if (has_one_part && layout.delta_count == 0) {
       keys.push_back(BaseKey(record.create_revision, layout.base_revision, 0));
@@ -141,7 +141,7 @@ std::vector<absl::StatusOr<std::vector<Vector>>> RocksDbStore::LoadVerticesOfEac
   std::vector<absl::StatusOr<std::vector<Vector>>> loaded(
       hulls.size(), absl::NotFoundError("the record has an unexpected number of values"));
   FindValues(keys, [&](size_t at, std::string_view sealed) {
-    const StoredHull& hull = *hulls[hull_of[at]];
+    const StoredHull& hull = hulls[hull_of[at]];
     const absl::StatusOr<std::string_view> value = Unseal(keys[at], sealed);
     VertexAssembly assembly(hull);
     absl::Status status = hull.layout.delta_count == 0
@@ -150,7 +150,7 @@ std::vector<absl::StatusOr<std::vector<Vector>>> RocksDbStore::LoadVerticesOfEac
     loaded[hull_of[at]] = std::move(assembly).Finish(std::move(status));
   });
   for (size_t i = 0; i < hulls.size(); ++i) {
-    if (!loaded[i].ok()) loaded[i] = LoadVertices(*hulls[i]);
+    if (!loaded[i].ok()) loaded[i] = LoadVertices(hulls[i]);
   }
   return loaded;
 }

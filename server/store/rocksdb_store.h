@@ -80,7 +80,7 @@ class RocksDbStore : public Store {
   absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull& hull) override;
   // Reads the first values of all hulls together, so that a block with several values is one read.
   std::vector<absl::StatusOr<std::vector<Vector>>> LoadVerticesOfEach(
-      std::span<const StoredHull* const> hulls) override;
+      std::span<const StoredHull> hulls) override;
   absl::StatusOr<uint64_t> LoadSequence(const HullRecord& hull,
                                         const std::string& writer_id) override;
   absl::StatusOr<std::vector<WriterSequence>> LoadWriters(const StoredHull& hull) override;

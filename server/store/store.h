@@ -153,10 +153,10 @@ class Store {
   virtual absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull& hull) = 0;
   // Returns LoadVertices of each hull, in order. Keeps all results in memory until it returns.
   virtual std::vector<absl::StatusOr<std::vector<Vector>>> LoadVerticesOfEach(
-      std::span<const StoredHull* const> hulls) {
+      std::span<const StoredHull> hulls) {
     std::vector<absl::StatusOr<std::vector<Vector>>> loaded;
     loaded.reserve(hulls.size());
-    for (const StoredHull* const hull : hulls) loaded.push_back(LoadVertices(*hull));
+    for (const StoredHull& hull : hulls) loaded.push_back(LoadVertices(hull));
     return loaded;
   }
   // Returns the writer's last committed sequence, or 0.

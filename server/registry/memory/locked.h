@@ -1,6 +1,8 @@
 #ifndef HULLD_SERVER_REGISTRY_MEMORY_LOCKED_H_
 #define HULLD_SERVER_REGISTRY_MEMORY_LOCKED_H_
 
+#include <absl/status/status.h>
+
 #include <algorithm>
 #include <atomic>
 #include <chrono>
@@ -12,6 +14,7 @@
 #include <vector>
 
 #include "core/base/check.h"
+#include "server/contract/stopped_call.h"
 #include "server/process/synchronization.h"
 
 namespace hulld::server {
@@ -143,15 +146,21 @@ class Locked {
     mutex_.BeginHold();
   }
 
+  // Runs the deferred tasks, then blocks until is_over() returns true; `changed` is notified when it
+  // may. CANCELLED: should_stop, which may be empty, returned true.
+  absl::Status Await(ConditionVariable& changed, const std::function<bool()>& should_stop,
+                     const std::function<bool()>& is_over) {
+    Yield();
+    while (!is_over()) {
+      WaitOn([&](auto& lock) { changed.wait_for(lock, kStopPoll, is_over); });
+      if (Stopped(should_stop)) return Cancelled();
+    }
+    return absl::OkStatus();
+  }
+
   // Counts a lookup within this hold of the mutex.
   void NoteLookup() { ++mutex_.lookups_; }
   uint64_t lookups() const { return mutex_.lookups_; }
-
-  // Counts one of many lookups; first yields the mutex after kMaxLookupsPerHold of them.
-  void NoteLookupMaybeYield() {
-    if (lookups() == kMaxLookupsPerHold) Yield();
-    NoteLookup();
-  }
 
   void Afterwards(std::function<void()> task) { afterwards_.push_back(std::move(task)); }
   // Defers a task that acquires the mutex again.

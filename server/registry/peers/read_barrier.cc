@@ -9,7 +9,6 @@
 #include "core/base/check.h"
 #include "core/base/status_macros.h"
 #include "server/contract/error_info.h"
-#include "server/contract/stopped_call.h"
 #include "server/registry/catalog/registered_hull.h"
 
 namespace hulld::server {
@@ -59,13 +58,8 @@ absl::Status ReadBarrier::AwaitCommits(Locked& locked, const std::function<bool(
     wait->status = status;
     wait->changed.notify_all();
   });
-  // Runs the deferred tasks before waiting.
-  locked.Yield();
-  const auto is_over = [&] { return wait->status.has_value(); };
-  while (!is_over()) {
-    locked.WaitOn([&](auto& lock) { wait->changed.wait_for(lock, kStopPoll, is_over); });
-    if (Stopped(should_stop)) return Cancelled();
-  }
+  HULLD_RETURN_IF_ERROR(
+      locked.Await(wait->changed, should_stop, [&] { return wait->status.has_value(); }));
   return *wait->status;
 }
 

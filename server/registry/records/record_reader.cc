@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <utility>
 
@@ -122,11 +123,8 @@ absl::Status RecordReader::AwaitKnown(Locked& locked, std::span<const std::strin
     if (awaited == nullptr) awaited = reading;
   }
   if (!own.empty()) ReadRecords(locked, own);
-  const auto is_over = [&] { return awaited->is_over; };
-  while (!is_over()) {
-    if (Stopped(should_stop)) return Cancelled();
-    locked.WaitOn([&](auto& lock) { awaited->over.wait_for(lock, kStopPoll, is_over); });
-  }
+  HULLD_RETURN_IF_ERROR(
+      locked.Await(awaited->over, should_stop, [&] { return awaited->is_over; }));
   return awaited->status;
 }
 
@@ -239,7 +237,7 @@ void RecordReader::OnPeerChange(Locked& /*locked*/, const std::string& id,
 void RecordReader::WhenReached(Locked& locked, uint64_t asked_at,
                                absl::StatusOr<FoundRecords> found, FoundTaker take) {
   if (found.ok() && found->revision < asked_at) found = WentBack(found->revision, asked_at);
-  if (!found.ok() || !IsBehind(*found, nullptr)) return take(locked, found);
+  if (!found.ok() || !IsBehind(*found)) return take(locked, found);
   // After this round of the committer, the registry includes everything that the store contained.
   const auto kept = std::make_shared<const FoundRecords>(*std::move(found));
   committer_.AddBarrier(
@@ -249,19 +247,6 @@ void RecordReader::WhenReached(Locked& locked, uint64_t asked_at,
         if (kept->revision > known) return take(later, IsAhead(kept->revision, known));
         take(later, *kept);
       });
-}
-
-absl::StatusOr<FoundRecords> RecordReader::AwaitReached(uint64_t asked_at,
-                                                        absl::StatusOr<FoundRecords> found,
-                                                        const std::function<bool()>& should_stop) {
-  if (!found.ok()) return found;
-  if (found->revision < asked_at) return WentBack(found->revision, asked_at);
-  Locked locked(state_.mutex);
-  if (!IsBehind(*found, &locked)) return found;
-  HULLD_RETURN_IF_ERROR(barrier_.AwaitCommits(locked, should_stop));
-  const uint64_t known = state_.revision();
-  if (found->revision > known) return IsAhead(found->revision, known);
-  return found;
 }
 
 // Returns true if the store has a later state of the hull than the registry, at the same revision:
@@ -276,32 +261,46 @@ bool RecordReader::IsBehind(const std::string& id, const absl::StatusOr<StoredHu
 
 // Returns true if the records are newer than the registry: committed, perhaps by a peer server, but
 // not yet applied. An answer from them would be followed by an older one from memory.
-bool RecordReader::IsBehind(const FoundRecords& found, Locked* yields) const {
-  if (found.revision > state_.revision()) return true;
-  return std::ranges::any_of(found.hulls, [&](const auto& hull) {
-    if (yields != nullptr) yields->NoteLookupMaybeYield();
-    return IsBehind(hull.first, hull.second);
-  });
+bool RecordReader::IsBehind(const FoundRecords& found) const {
+  return found.revision > state_.revision() ||
+         std::ranges::any_of(found.hulls, [&](const auto& hull) {
+           return IsBehind(hull.first, hull.second);
+         });
+}
+
+absl::StatusOr<FoundRecords> RecordReader::Query(const PageRequest& request) {
+  absl::StatusOr<FoundRecords> found =
+      request.ids.empty() ? state_.store.ListRecords(request.prefix, request.after,
+                                                     request.page_size, request.kinds)
+                          : state_.store.FindRecords(request.ids);
+  if (found.ok() && !request.kinds.bodies) found->bodies.clear();
+  return found;
 }
 
 absl::StatusOr<RecordPage> RecordReader::List(const PageRequest& request,
                                               const std::function<bool()>& should_stop) {
-  uint64_t asked_at = 0;
-  {
-    Locked locked(state_.mutex);
-    if (!state_.is_cache()) return CataloguedPage(request);
-    asked_at = state_.revision();
-    const absl::Status memory =
-        request.kinds.bodies ? state_.memory.Check(locked, MemoryUse::kReading) : absl::OkStatus();
-    if (!memory.ok()) return memory;
-  }
-  HULLD_ASSIGN_OR_RETURN(const FoundRecords found,
-                         AwaitReached(asked_at,
-                                      state_.store.ListRecords(request.prefix, request.after,
-                                                               request.page_size, request.kinds),
-                                      should_stop));
   Locked locked(state_.mutex);
-  return Describe(found, &locked);
+  if (!state_.is_cache()) return CataloguedPage(request);
+  if (request.kinds.bodies) {
+    HULLD_RETURN_IF_ERROR(state_.memory.Check(locked, MemoryUse::kReading));
+  }
+  const uint64_t asked_at = state_.revision();
+  locked.Unlock();
+  absl::StatusOr<FoundRecords> found = Query(request);
+  locked.Lock();
+  struct Wait {
+    ConditionVariable over;
+    std::optional<absl::StatusOr<RecordPage>> page;
+  };
+  const auto wait = std::make_shared<Wait>();
+  WhenReached(locked, asked_at, std::move(found),
+              [this, wait](Locked&, const absl::StatusOr<FoundRecords>& reached) {
+                wait->page = Describe(reached);
+                wait->over.notify_all();
+              });
+  HULLD_RETURN_IF_ERROR(
+      locked.Await(wait->over, should_stop, [&] { return wait->page.has_value(); }));
+  return *std::move(wait->page);
 }
 
 // The registry may know more about this version than its record: its box, or its damage.
@@ -321,13 +320,12 @@ HullChange RecordReader::Describe(const std::string& id,
   return described.record == change.record ? described : change;
 }
 
-RecordPage RecordReader::Describe(const FoundRecords& found, Locked* yields) const {
-  RecordPage page = {.store_revision = found.revision, .more = found.more};
-  for (const auto& [id, stored] : found.hulls) {
-    if (yields != nullptr) yields->NoteLookupMaybeYield();
-    page.entries.push_back(Describe(id, stored));
-  }
-  for (const auto& [id, stored] : found.bodies) {
+absl::StatusOr<RecordPage> RecordReader::Describe(
+    const absl::StatusOr<FoundRecords>& found) const {
+  if (!found.ok()) return found.status();
+  RecordPage page = {.store_revision = found->revision, .more = found->more};
+  for (const auto& [id, stored] : found->hulls) page.entries.push_back(Describe(id, stored));
+  for (const auto& [id, stored] : found->bodies) {
     const StoredBody nothing = {{id, 0, 0}, {}, {}};
     page.entries.push_back(Body::Describe(stored.ok() ? *stored : nothing, stored.status()));
   }
@@ -378,17 +376,12 @@ void RecordReader::ReadPage(Locked& locked, PageRequest request,
   loaders_.Submit(
       [this, request = std::move(request), done = std::move(done),
        asked_at = state_.revision()]() mutable {
-        absl::StatusOr<FoundRecords> found =
-            request.ids.empty() ? state_.store.ListRecords(request.prefix, request.after,
-                                                           request.page_size, request.kinds)
-                                : state_.store.FindRecords(request.ids);
-        if (found.ok() && !request.kinds.bodies) found->bodies.clear();
+        absl::StatusOr<FoundRecords> found = Query(request);
         Locked later(state_.mutex);
         WhenReached(later, asked_at, std::move(found),
                     [this, done = std::move(done)](Locked& now,
                                                    const absl::StatusOr<FoundRecords>& reached) {
-                      if (!reached.ok()) return done(now, reached.status());
-                      done(now, Describe(*reached, nullptr));
+                      done(now, Describe(reached));
                     });
       },
       kWatchReader);

@@ -129,16 +129,13 @@ class RecordReader : public PeerChangeListener, public PageSource {
   // in between.
   void WhenReached(Locked& locked, uint64_t asked_at, absl::StatusOr<FoundRecords> found,
                    FoundTaker take);
-  // As WhenReached, but blocks. Requires that the thread does not hold the mutex. CANCELLED:
-  // should_stop returned true.
-  absl::StatusOr<FoundRecords> AwaitReached(uint64_t asked_at, absl::StatusOr<FoundRecords> found,
-                                            const std::function<bool()>& should_stop);
   bool IsBehind(const std::string& id, const absl::StatusOr<StoredHull>& stored) const;
-  // yields, here and below: if not null, the mutex may be released between lookups.
-  bool IsBehind(const FoundRecords& found, Locked* yields) const;
+  bool IsBehind(const FoundRecords& found) const;
 
+  // Queries the store for a page.
+  absl::StatusOr<FoundRecords> Query(const PageRequest& request);
   HullChange Describe(const std::string& id, const absl::StatusOr<StoredHull>& stored) const;
-  RecordPage Describe(const FoundRecords& found, Locked* yields) const;
+  absl::StatusOr<RecordPage> Describe(const absl::StatusOr<FoundRecords>& found) const;
   RecordPage CataloguedPage(const PageRequest& request) const;
 
   RegistryState& state_;
