@@ -13,7 +13,7 @@
 #include "server/call/pulled_stream.h"
 #include "server/process/task_pool.h"
 #include "server/registry/registry.h"
-#include "server/registry/watch/change_watch.h"
+#include "server/registry/watch/change_feed.h"
 
 namespace hulld::server {
 

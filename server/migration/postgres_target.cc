@@ -10,7 +10,6 @@
 #include "server/migration/migration_target.h"
 #include "server/store/postgres/batch_statements.h"
 #include "server/store/postgres/conninfo.h"
-#include "server/store/postgres/parameters.h"
 #include "server/store/postgres/postgres_store.h"
 #include "server/store/postgres/session.h"
 

@@ -1,12 +1,9 @@
 #ifndef HULLD_SERVER_STORE_BODY_RECORD_H_
 #define HULLD_SERVER_STORE_BODY_RECORD_H_
 
-#include <absl/status/statusor.h>
-
 #include <cstddef>
 #include <cstdint>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "core/query/terms/pose.h"
@@ -36,15 +33,12 @@ struct StoredBody {
   std::vector<std::string> hull_ids;
   std::vector<StoredPiece> pieces;
 
-  // Bytes of memory.
-  size_t MemoryBytes() const;
+  size_t MemoryBytes() const {
+    size_t bytes = sizeof(*this) + pieces.capacity() * sizeof(StoredPiece);
+    for (const std::string& id : hull_ids) bytes += sizeof(std::string) + id.capacity();
+    return bytes;
+  }
 };
-
-// Encodes all fields but the ID, which is the key, as binary numbers and texts with their lengths.
-// Radii follow at the end unless all are 0.
-std::string EncodeStoredBody(const StoredBody& body);
-// DATA_LOSS: the bytes do not encode a body.
-absl::StatusOr<StoredBody> DecodeStoredBody(std::string_view body_id, std::string_view value);
 
 }  // namespace hulld::server
 

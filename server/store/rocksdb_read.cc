@@ -6,7 +6,6 @@
 
 #include "core/base/status_macros.h"
 #include "server/store/rocksdb_store.h"
-#include "server/store/sealed_hull.h"
 #include "server/store/store_errors.h"
 #include "server/store/store_keys.h"
 

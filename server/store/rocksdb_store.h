@@ -4,6 +4,7 @@
 #include <absl/status/statusor.h>
 #include <rocksdb/db.h>
 #include <rocksdb/env.h>
+#include <rocksdb/write_batch.h>
 
 #include <atomic>
 #include <chrono>
@@ -22,11 +23,16 @@
 
 #include "server/store/files/disk_reserve.h"
 #include "server/store/files/log_file_system.h"
-#include "server/store/sealed_hull.h"
 #include "server/store/store.h"
 #include "server/store/store_keys.h"
 
 namespace hulld::server {
+
+// Adds a value with its checksum to the batch.
+void PutSealed(rocksdb::WriteBatch& batch, const std::string& key, std::string value);
+
+// Adds the effect of a change on the keys of the store (store_keys.h), except the store's revision.
+void EncodeChange(rocksdb::WriteBatch& batch, const Change& change);
 
 struct RocksDbOptions {
   // Created if missing, and on disk before the first acknowledgement.

@@ -16,7 +16,7 @@
 
 #include "server/registry/body_resolution.h"
 #include "server/registry/registry.h"
-#include "server/registry/watch/change_watch.h"
+#include "server/registry/watch/change_feed.h"
 
 namespace hulld::server {
 

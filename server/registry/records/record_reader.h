@@ -20,7 +20,7 @@
 #include "server/registry/memory/locked.h"
 #include "server/registry/peers/read_barrier.h"
 #include "server/registry/state/registry_state.h"
-#include "server/registry/watch/change_watch.h"
+#include "server/registry/watch/change_feed.h"
 #include "server/store/store.h"
 
 namespace hulld::server {

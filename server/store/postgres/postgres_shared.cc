@@ -11,7 +11,7 @@
 #include "server/process/random_id.h"
 #include "server/store/postgres/batch_statements.h"
 #include "server/store/postgres/postgres_store.h"
-#include "server/store/sealed_hull.h"
+#include "server/store/store_keys.h"
 
 namespace hulld::server {
 namespace {

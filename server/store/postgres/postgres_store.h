@@ -21,7 +21,6 @@
 #include "server/store/postgres/batch_notices.h"
 #include "server/store/postgres/conninfo.h"
 #include "server/store/postgres/session.h"
-#include "server/store/postgres/session_pool.h"
 #include "server/store/store.h"
 
 namespace hulld::server {
