@@ -19,16 +19,10 @@ struct LocalChanges::OpenRequest {
   std::string hull_id;
   std::string writer_id;
   bool create_if_absent = false;
-  bool created_hull = false;
   std::function<void(const absl::Status&)> on_gone;
   Reply<OpenResult> done;
   ClientId client = kNoClient;
-  // The hull read for the request; keeps it known until the request is processed.
-  HullPointer known = nullptr;
 };
-
-// Result of checking a chunk that is allowed.
-enum class LocalChanges::Verdict { kNew, kAlreadyApplied };
 
 // A chunk added to the builder, and its change to commit.
 struct LocalChanges::BuiltChunk {
@@ -90,79 +84,69 @@ void AnswerChunk(Locked& locked, const Reply<ChunkResult>& done, uint64_t sequen
 }  // namespace
 
 void LocalChanges::OpenAppend(const std::string& id, const std::string& writer_id,
-                             bool create_if_absent,
-                             std::function<void(const absl::Status&)> on_gone,
-                             Reply<OpenResult> done, ClientId client) {
-  const auto request = std::make_shared<OpenRequest>(OpenRequest{
-      id, writer_id, create_if_absent, false, std::move(on_gone), std::move(done), client});
-  // May read the store.
-  barrier_.WhenFresh(request->done, [=, this](Locked&) { RunOpen(request); });
+                              bool create_if_absent,
+                              std::function<void(const absl::Status&)> on_gone,
+                              Reply<OpenResult> done, ClientId client) {
+  const auto request = std::make_shared<OpenRequest>(
+      OpenRequest{id, writer_id, create_if_absent, std::move(on_gone), std::move(done), client});
+  records_.WhenReady(
+      id, RecordReader::For::kLife, request->done,
+      [=, this](Locked& locked, const LockedTask& again) {
+        const HullPointer hull = state_.Find(request->hull_id);
+        if (hull == nullptr) return OpenNew(locked, request, again);
+        // May query the store.
+        writers_.Submit(
+            [=, this] {
+              Locked later(state_.mutex);
+              OpenExisting(later, hull, request, again);
+            },
+            request->client);
+      });
 }
 
-void LocalChanges::RunOpen(const std::shared_ptr<OpenRequest>& request) {
-  writers_.Submit(
-      [this, request] {
-        Locked locked(state_.mutex);
-        OpenLocked(locked, request);
-      },
-      request->client);
+// The session opens in the completion of the creation, because the hull may be gone immediately
+// afterwards.
+void LocalChanges::OpenNew(Locked& locked, const std::shared_ptr<OpenRequest>& request,
+                           const LockedTask& again) {
+  if (!request->create_if_absent) {
+    return Answer(locked, request->done, state_.NoSuchHull(request->hull_id));
+  }
+  CreateNew(locked, request->hull_id,
+            [=, this](Locked& later, const absl::StatusOr<HullPointer>& created) {
+              if (Committer::IsSuperseded(created.status())) return later.AfterwardsLocked(again);
+              if (!created.ok()) return Answer(later, request->done, created.status());
+              OpenSession(later, *created, *request, true, 0);
+            });
 }
 
-// Runs on a thread of `writers_`. May release the mutex to query the store.
-void LocalChanges::OpenLocked(Locked& locked, const std::shared_ptr<OpenRequest>& request) {
-  const auto refuse = [request](Locked& later, const absl::Status& status) {
-    Answer(later, request->done, status);
-  };
-  const std::string& id = request->hull_id;
-  const HullPointer known = std::exchange(request->known, nullptr);
-  if (!state_.IsKnown(id)) {
-    return records_.WhenKnown(locked, id, request->done, [this, request](Locked& later) {
-      const bool is_known = state_.IsKnown(request->hull_id);
-      if (is_known) request->known = state_.Find(request->hull_id);
-      // Without a hull, no further store read is needed.
-      if (is_known && request->known == nullptr) return OpenLocked(later, request);
-      RunOpen(request);
-    });
-  }
-  if (records_.MustWait(locked, id, RecordReader::For::kLife, request->done,
-                        [this, request](Locked&) { RunOpen(request); })) {
-    return;
-  }
-  const HullPointer hull = state_.Find(id);
-  if (hull == nullptr) {
-    if (!request->create_if_absent) return refuse(locked, state_.NoSuchHull(request->hull_id));
-    // The session opens in the completion of the creation, because the hull may be gone immediately
-    // afterwards.
-    return CreateNew(
-        locked, request->hull_id,
-        [this, request, refuse](Locked& later, const absl::StatusOr<HullPointer>& created) {
-          if (Committer::IsSuperseded(created.status())) return RunOpen(request);
-          if (!created.ok()) return refuse(later, created.status());
-          request->created_hull = true;
-          OpenSession(later, *created, request, 0);
-        });
-  }
-  if (hull->state.damaged()) return refuse(locked, hull->state.damage());
+// May release the mutex to query the store.
+void LocalChanges::OpenExisting(Locked& locked, const HullPointer& hull,
+                                const std::shared_ptr<OpenRequest>& request,
+                                const LockedTask& again) {
+  const auto has_ended = [&] { return hull->state.gone() || hull->state.changing_life(); };
+  if (has_ended()) return again(locked);
+  if (hull->state.damaged()) return Answer(locked, request->done, hull->state.damage());
   const absl::StatusOr<uint64_t> last = CommittedSequence(locked, *hull, request->writer_id);
-  if (!last.ok()) return refuse(locked, last.status());
+  if (!last.ok()) return Answer(locked, request->done, last.status());
   // The end of a hull removes its sequences from the store before the registry applies it.
-  if (hull->state.gone() || hull->state.changing_life()) return OpenLocked(locked, request);
+  if (has_ended()) return again(locked);
   if (*last == 0 && hull->head().writer_count >= state_.limits.max_writers_per_hull) {
-    return refuse(locked, TooManyWriters(hull->head(), state_.limits.max_writers_per_hull));
+    return Answer(locked, request->done,
+                  TooManyWriters(hull->head(), state_.limits.max_writers_per_hull));
   }
-  OpenSession(locked, hull, request, *last);
+  OpenSession(locked, hull, *request, false, *last);
 }
 
-void LocalChanges::OpenSession(Locked& locked, const HullPointer& hull,
-                              const std::shared_ptr<OpenRequest>& request, uint64_t last_sequence) {
+void LocalChanges::OpenSession(Locked& locked, const HullPointer& hull, OpenRequest& request,
+                               bool created_hull, uint64_t last_sequence) {
   HULLD_CHECK(hull->state.visible());
   OpenResult result;
-  hull->watches.emplace(++last_watch_, std::move(request->on_gone));
+  hull->watches.emplace(++last_watch_, std::move(request.on_gone));
   result.store_revision = state_.revision();
   result.hull = hull->committed().record;
   result.last_sequence = last_sequence;
-  result.session = {hull, request->writer_id, request->created_hull, last_watch_, request->client};
-  Answer(locked, request->done, std::move(result));
+  result.session = {hull, request.writer_id, created_hull, last_watch_, request.client};
+  Answer(locked, request.done, std::move(result));
 }
 
 // Returns the last committed sequence of a writer. May release the mutex to query the store.
@@ -248,20 +232,19 @@ void LocalChanges::RefuseChunks(const HullPointer& hull) {
 // building.
 void LocalChanges::ApplyChunk(Locked& locked, const HullPointer& hull, PendingChunk& pending) {
   const uint64_t sequence = pending.chunk.sequence;
-  absl::StatusOr<Verdict> verdict = CheckChunk(locked, *hull, pending);
+  absl::StatusOr<bool> is_new = CheckChunk(locked, *hull, pending);
   // Without a commit, no store write detects a stale state, so compare explicitly.
-  const bool is_new = verdict.ok() && *verdict == Verdict::kNew;
-  if (!is_new && barrier_.has_peers()) {
+  if (!is_new.value_or(false) && barrier_.has_peers()) {
     const absl::Status fresh = barrier_.AwaitPeers(locked, pending.should_stop);
-    verdict = fresh.ok() ? CheckChunk(locked, *hull, pending) : fresh;
+    is_new = fresh.ok() ? CheckChunk(locked, *hull, pending) : fresh;
     // An earlier chunk must be rebuilt first.
     if (hull->IsQueuedBefore(pending)) {
       hull->Requeue(std::move(pending));
       return;
     }
   }
-  if (!verdict.ok()) return AnswerChunk(locked, pending.done, sequence, verdict.status());
-  if (*verdict == Verdict::kAlreadyApplied) {
+  if (!is_new.ok()) return AnswerChunk(locked, pending.done, sequence, is_new.status());
+  if (!*is_new) {
     const HullRecord& record = hull->committed().record;
     return AnswerChunk(
         locked, pending.done, sequence,
@@ -280,15 +263,16 @@ void LocalChanges::ApplyChunk(Locked& locked, const HullPointer& hull, PendingCh
   SubmitChunk(locked, hull, pending, *std::move(built));
 }
 
-// Checks a chunk before building. May release the mutex to query the store.
-absl::StatusOr<LocalChanges::Verdict> LocalChanges::CheckChunk(Locked& locked, RegisteredHull& hull,
-                                                             const PendingChunk& pending) {
+// Checks a chunk before building. Returns false if it was already applied. May release the mutex to
+// query the store.
+absl::StatusOr<bool> LocalChanges::CheckChunk(Locked& locked, RegisteredHull& hull,
+                                              const PendingChunk& pending) {
   if (hull.state.gone()) return GoneWhileStreaming(hull);
   const Chunk& chunk = pending.chunk;
   const std::string& writer_id = pending.session.writer_id;
   HULLD_ASSIGN_OR_RETURN(const uint64_t committed, CommittedSequence(locked, hull, writer_id));
   if (hull.state.gone()) return GoneWhileStreaming(hull);
-  if (chunk.sequence <= committed) return Verdict::kAlreadyApplied;
+  if (chunk.sequence <= committed) return false;
   const uint64_t last = hull.HeadSequence(writer_id);
   if (chunk.sequence != last + 1) {
     return WithReason(absl::FailedPreconditionError(absl::StrCat(
@@ -306,7 +290,7 @@ absl::StatusOr<LocalChanges::Verdict> LocalChanges::CheckChunk(Locked& locked, R
   HULLD_RETURN_IF_ERROR(CheckChunkRevision(pending.session, record, chunk));
   HULLD_RETURN_IF_ERROR(CheckPointCount(record, chunk, state_.limits));
   HULLD_RETURN_IF_ERROR(state_.memory.Check(locked, MemoryUse::kWriting));
-  return Verdict::kNew;
+  return true;
 }
 
 // Adds a chunk to its hull's builder, without the mutex. On success `head` and the writer's

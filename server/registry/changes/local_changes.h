@@ -113,7 +113,6 @@ class LocalChanges : public PeerChangeListener {
   using Creation = std::function<void(Locked&, absl::StatusOr<HullPointer>)>;
   struct OpenRequest;
   struct BuiltChunk;
-  enum class Verdict;
 
   void Submit(Locked& locked, const HullPointer& hull, Change change, Committer::Completion finish);
   void Advance(Locked& locked, const HullPointer& hull);
@@ -127,17 +126,19 @@ class LocalChanges : public PeerChangeListener {
                          const std::shared_ptr<Replacement>& replacement,
                          const Reply<PutHullResult>& done, const LockedTask& again);
 
-  void RunOpen(const std::shared_ptr<OpenRequest>& request);
-  void OpenLocked(Locked& locked, const std::shared_ptr<OpenRequest>& request);
-  void OpenSession(Locked& locked, const HullPointer& hull,
-                   const std::shared_ptr<OpenRequest>& request, uint64_t last_sequence);
+  void OpenNew(Locked& locked, const std::shared_ptr<OpenRequest>& request,
+               const LockedTask& again);
+  void OpenExisting(Locked& locked, const HullPointer& hull,
+                    const std::shared_ptr<OpenRequest>& request, const LockedTask& again);
+  void OpenSession(Locked& locked, const HullPointer& hull, OpenRequest& request, bool created_hull,
+                   uint64_t last_sequence);
   absl::StatusOr<uint64_t> CommittedSequence(Locked& locked, RegisteredHull& hull,
                                              const std::string& writer_id);
   void RunNextChunk(const HullPointer& hull);
   void RefuseChunks(const HullPointer& hull);
   void ApplyChunk(Locked& locked, const HullPointer& hull, PendingChunk& pending);
-  absl::StatusOr<Verdict> CheckChunk(Locked& locked, RegisteredHull& hull,
-                                     const PendingChunk& pending);
+  absl::StatusOr<bool> CheckChunk(Locked& locked, RegisteredHull& hull,
+                                  const PendingChunk& pending);
   absl::StatusOr<BuiltChunk> Build(Locked& locked, RegisteredHull& hull, PendingChunk& pending);
   absl::StatusOr<std::shared_ptr<LiveHull>> LiveForWriter(Locked& locked, RegisteredHull& hull);
   absl::StatusOr<PointCounts> AddPoints(PendingChunk& pending, LentBuilder& lent, LiveHull& live,

@@ -61,26 +61,16 @@ void RecordReader::WhenReady(const std::string& id, For need, Refusal refuse, Ta
 
 void RecordReader::RunWhenReady(Locked& locked, const std::shared_ptr<const ReadyTask>& ready) {
   const LockedTask again = [this, ready](Locked& later) { RunWhenReady(later, ready); };
-  if (MustWait(locked, ready->id, ready->need, ready->refuse, again)) return;
+  const std::string& id = ready->id;
+  if (!state_.IsKnown(id)) return WhenKnown(locked, id, ready->refuse, again);
+  BodyTable::Entry* const body = state_.bodies.Find(id);
+  if (body != nullptr && body->in_flight) return body->waiting.push_back(again);
+  if (const HullPointer hull = state_.Find(id); hull != nullptr) {
+    const HullState& state = hull->state;
+    const bool waits = ready->need == For::kQuiet ? !state.quiet() : state.changing_life();
+    if (waits) return hull->exclusive.push_back(again);
+  }
   ready->task(locked, again);
-}
-
-bool RecordReader::MustWait(Locked& locked, const std::string& id, For need, const Refusal& refuse,
-                            LockedTask next) {
-  if (!state_.IsKnown(id)) {
-    WhenKnown(locked, id, refuse, std::move(next));
-    return true;
-  }
-  if (BodyTable::Entry* const body = state_.bodies.Find(id); body != nullptr && body->in_flight) {
-    body->waiting.push_back(std::move(next));
-    return true;
-  }
-  const HullPointer hull = state_.Find(id);
-  if (hull == nullptr) return false;
-  const HullState& state = hull->state;
-  const bool waits = need == For::kQuiet ? !state.quiet() : state.changing_life();
-  if (waits) hull->exclusive.push_back(std::move(next));
-  return waits;
 }
 
 // Sends one query; IDs that arrive during it go into the next one. The thread is offered to other

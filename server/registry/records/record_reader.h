@@ -55,10 +55,6 @@ class RecordReader : public PeerChangeListener, public PageSource {
   RecordReader(const RecordReader&) = delete;
   RecordReader& operator=(const RecordReader&) = delete;
 
-  // Reads the record of an ID, then runs `next`, which must check again that the ID is known; or
-  // refuses, without the mutex. Requires: the ID is unknown.
-  void WhenKnown(Locked& locked, const std::string& id, Refusal refuse, LockedTask next);
-
   // State of an ID that a task requires. kLife: known, with no change of a body and no creation or
   // end of a hull in flight. kQuiet: known, with nothing in flight.
   enum class For { kLife, kQuiet };
@@ -66,10 +62,6 @@ class RecordReader : public PeerChangeListener, public PageSource {
   // state; or refuses, without the mutex. The task may run again by `again`, which waits likewise.
   using Task = std::function<void(Locked& locked, const LockedTask& again)>;
   void WhenReady(const std::string& id, For need, Refusal refuse, Task task);
-  // Returns true if the ID is not in that state; then `next` runs when it may have reached that
-  // state, and must check again. Otherwise does nothing. refuse: as WhenKnown.
-  bool MustWait(Locked& locked, const std::string& id, For need, const Refusal& refuse,
-                LockedTask next);
 
   // Blocks until the first ID is known; also reads up to kMaxLookupsPerHold pending IDs. Releases
   // the mutex. Returns the error of the read, or CANCELLED if should_stop, which may be empty,
@@ -114,6 +106,9 @@ class RecordReader : public PeerChangeListener, public PageSource {
   // Called with the registry's mutex held, with the records valid from then on, or an error.
   using FoundTaker = std::function<void(Locked&, const absl::StatusOr<FoundRecords>&)>;
 
+  // Reads the record of an ID, then runs `next`, which must check again that the ID is known; or
+  // refuses, without the mutex. Requires: the ID is unknown.
+  void WhenKnown(Locked& locked, const std::string& id, Refusal refuse, LockedTask next);
   absl::Status AwaitMissing(Locked& locked, std::span<const std::string> ids,
                             const std::function<bool()>& should_stop);
   void RunWhenReady(Locked& locked, const std::shared_ptr<const ReadyTask>& ready);
