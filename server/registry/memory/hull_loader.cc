@@ -23,12 +23,12 @@ bool SpanSpace(std::span<const Vector> points) {
          });
 }
 
-// Maximum numbers of points, excluding the last hull, and of hulls that a thread loads per step,
-// which takes about 50 us.
-constexpr uint64_t kPointsAtOnce = 1024;
-constexpr size_t kHullsAtOnce = 16;
-// Minimum number of parts of a large job: small parts let all threads finish together.
-constexpr size_t kMinParts = 8;
+// Maximum number of hulls that a thread loads per step; takes about 50 us for small hulls.
+constexpr size_t kMaxPerStep = 16;
+// Minimum number of steps of a large load: small steps let all threads finish together.
+constexpr size_t kMinSteps = 8;
+// Loading this many small hulls takes longer than waking a thread.
+constexpr size_t kWorthAThread = 8;
 
 uint64_t PointCount(const StoredHull& stored) {
   return stored.layout.base_vertices + stored.layout.delta_vertices;
@@ -64,30 +64,18 @@ absl::StatusOr<std::shared_ptr<LiveHull>> LoadLive(Store& store, const StoredHul
 
 std::vector<LoadedHull> LoadEach(Store& store, std::span<const StoredHull> hulls, TaskPool& helpers,
                                  const std::function<bool()>& should_stop) {
-  const size_t most = std::clamp<size_t>(hulls.size() / kMinParts, 1, kHullsAtOnce);
-  // Ends of the parts.
-  std::vector<size_t> ends;
-  uint64_t points = 0;
-  for (size_t n = 0, begin = 0; n < hulls.size(); ++n) {
-    points += PointCount(hulls[n]);
-    if (points < kPointsAtOnce && n + 1 - begin < most && n + 1 < hulls.size()) continue;
-    ends.push_back(begin = n + 1);
-    points = 0;
-  }
   // Each element is written by one thread, and read after all have ended.
   std::vector<LoadedHull> loaded(hulls.size(), Cancelled());
-  const auto load_part = [&](size_t part, size_t) {
-    const size_t begin = part == 0 ? 0 : ends[part - 1];
-    const std::span some = hulls.subspan(begin, ends[part] - begin);
-    std::vector<absl::StatusOr<std::vector<Vector>>> read = store.LoadVerticesOfEach(some);
-    for (size_t n = 0; n < some.size(); ++n) {
-      loaded[begin + n] = MakeLive(some[n], std::move(read[n]));
+  const auto load = [&](size_t begin, size_t end) {
+    std::vector<absl::StatusOr<std::vector<Vector>>> points =
+        store.LoadVerticesOfEach(hulls.subspan(begin, end - begin));
+    for (size_t i = begin; i < end; ++i) {
+      loaded[i] = MakeLive(hulls[i], std::move(points[i - begin]));
     }
   };
-  // Loading this many small hulls takes longer than waking a thread.
-  constexpr size_t kWorthAThread = 8;
-  SharedLoop::Start(helpers, std::min(helpers.threads(), hulls.size() / kWorthAThread), ends.size(),
-                    1, load_part)
+  SharedLoop::Start(helpers, std::min(helpers.threads(), hulls.size() / kWorthAThread),
+                    hulls.size(), std::clamp<size_t>(hulls.size() / kMinSteps, 1, kMaxPerStep),
+                    load)
       ->Finish(should_stop);
   return loaded;
 }

@@ -14,7 +14,6 @@
 #include "server/process/metrics.h"
 #include "server/process/task_pool.h"
 #include "server/registry/catalog/body.h"
-#include "server/registry/catalog/body_table.h"
 #include "server/registry/catalog/hull_table.h"
 #include "server/registry/catalog/known_hulls.h"
 #include "server/registry/catalog/registry_types.h"

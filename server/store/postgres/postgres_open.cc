@@ -303,7 +303,7 @@ absl::Status PostgresStore::CheckServer(Session& session) {
   HULLD_ASSIGN_OR_RETURN(
       const Rows settings,
       session.Run("SELECT current_setting('synchronous_commit'), current_setting('fsync')"));
-  synchronous_commit_ = std::string(settings.at(0, 0));
+  synchronous_commit_ = options_.migrating ? "on" : std::string(settings.at(0, 0));
   const bool is_sync = synchronous_commit_ != "off" && settings.at(0, 1) == "on";
   durability_ = is_sync ? Durability::kSync : Durability::kRelaxed;
   if (options_.shared && !is_sync) {

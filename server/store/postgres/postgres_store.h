@@ -37,7 +37,8 @@ struct PostgresOptions {
   std::string conninfo;
   // Replaces the active server instead of waiting for it to exit.
   bool take_over = false;
-  // Also opens a store with an unfinished migration.
+  // Also opens a store with an unfinished migration. Commits are on disk, regardless of the role's
+  // default.
   bool migrating = false;
   // Opens only a database that contains a store.
   bool must_exist = false;
@@ -140,6 +141,13 @@ class PostgresStore : public Store, public PeerFeed {
   static constexpr uint64_t kFormat = 4;
   // The epoch of this server, which only grows.
   uint64_t epoch() const { return epoch_.load(); }
+
+  // For a migration: the session of commits, and the statement of a transaction that commits
+  // nothing else than `added`, the change of the totals, and this revision.
+  Session& writer() { return *writer_; }
+  Statement Fence(uint64_t revision, const StoreTotals& added) const {
+    return Fence({batch_, revision, added});
+  }
 
  private:
   // Owner of a shared store.
