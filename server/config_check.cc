@@ -74,7 +74,7 @@ absl::Status CheckDataDir(const std::string& path) {
 
 absl::Status CheckConninfoFile(const std::string& path, const char* setting) {
   HULLD_ASSIGN_OR_RETURN(const std::string text, ReadSecretFile(path, setting));
-  return Prefixed(absl::StrCat(setting, " ", path, ": "), Conninfo::Parse(text).status());
+  return Prefixed(absl::StrCat(setting, " ", path, ": "), ParseConninfo(text).status());
 }
 
 std::vector<std::string> ExposureWarnings(const Config& config) {

@@ -220,7 +220,7 @@ absl::Status RocksDbStore::Lock() {
 absl::Status RocksDbStore::CheckLogs() {
   const std::string directory = DatabaseDirectory(options_.data_dir);
   const std::string path = LogMarkPath(options_.data_dir);
-  absl::StatusOr<std::optional<LogMark>> mark = LogMarkFile::Read(*files_, path);
+  absl::StatusOr<std::optional<LogMark>> mark = ReadLogMark(*files_, path);
   if (absl::IsDataLoss(mark.status())) {
     if (options_.accept_loss) return absl::OkStatus();
     return LogLost(options_.data_dir, std::string(mark.status().message()), std::nullopt);

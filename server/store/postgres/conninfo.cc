@@ -27,7 +27,7 @@ constexpr struct {
 
 }  // namespace
 
-absl::StatusOr<Conninfo> Conninfo::Parse(const std::string& text) {
+absl::StatusOr<Conninfo> ParseConninfo(const std::string& text) {
   const std::string trimmed(absl::StripAsciiWhitespace(text));
   if (trimmed.empty()) return absl::InvalidArgumentError("it is empty");
   // libpq's message would quote the text.
@@ -43,12 +43,12 @@ absl::StatusOr<Conninfo> Conninfo::Parse(const std::string& text) {
   }
   Conninfo conninfo;
   for (const PQconninfoOption* option = options.get(); option->keyword != nullptr; ++option) {
-    if (option->val != nullptr) conninfo.parameters_[option->keyword] = option->val;
+    if (option->val != nullptr) conninfo[option->keyword] = option->val;
   }
-  for (const auto& [keyword, value] : kDefaults) conninfo.parameters_.emplace(keyword, value);
+  for (const auto& [keyword, value] : kDefaults) conninfo.emplace(keyword, value);
   const auto holds = [&](const char* keyword, const char* forbidden, bool only) {
-    const auto found = conninfo.parameters_.find(keyword);
-    if (found == conninfo.parameters_.end()) return false;
+    const auto found = conninfo.find(keyword);
+    if (found == conninfo.end()) return false;
     return (only ? found->second.find_first_not_of(forbidden)
                  : found->second.find_first_of(forbidden)) != std::string::npos;
   };

@@ -8,22 +8,15 @@
 
 namespace hulld::server {
 
-// Connection parameters of a database. They may include passwords, so no error or log line quotes
-// the text; libpq's own errors name host, port, user and database.
-class Conninfo {
- public:
-  // text: a connection string of libpq, keywords with values or a URI. Missing keywords get
-  // defaults that bound the wait for an unreachable machine and select a writable server.
-  // INVALID_ARGUMENT, without quoting the text: it is not a connection string, or a password in it
-  // ends early, so that its rest would be parsed as a host or a database.
-  static absl::StatusOr<Conninfo> Parse(const std::string& text);
+// Connection parameters of a database by keyword, for PQconnectdbParams. They may include passwords,
+// so no error or log line quotes the text; libpq's own errors name host, port, user and database.
+using Conninfo = std::map<std::string, std::string>;
 
-  // By keyword, for PQconnectdbParams.
-  const std::map<std::string, std::string>& parameters() const { return parameters_; }
-
- private:
-  std::map<std::string, std::string> parameters_;
-};
+// text: a connection string of libpq, keywords with values or a URI. Missing keywords get defaults
+// that bound the wait for an unreachable machine and select a writable server. INVALID_ARGUMENT,
+// without quoting the text: it is not a connection string, or a password in it ends early, so that
+// its rest would be parsed as a host or a database.
+absl::StatusOr<Conninfo> ParseConninfo(const std::string& text);
 
 }  // namespace hulld::server
 

@@ -202,7 +202,7 @@ PostgresStore::PostgresStore(PostgresOptions options, Conninfo conninfo)
       follower_([this] { return OpenReader(); }, 1) {}
 
 absl::StatusOr<std::unique_ptr<PostgresStore>> PostgresStore::Open(PostgresOptions options) {
-  absl::StatusOr<Conninfo> conninfo = Conninfo::Parse(options.conninfo);
+  absl::StatusOr<Conninfo> conninfo = ParseConninfo(options.conninfo);
   if (!conninfo.ok()) {
     return Prefixed(absl::StrCat(PostgresOptions::kSetting, ": "), conninfo.status());
   }

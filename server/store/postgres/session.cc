@@ -77,7 +77,7 @@ absl::StatusOr<std::unique_ptr<Session>> Session::Open(const Conninfo& conninfo,
                                                        std::chrono::milliseconds answer_time) {
   std::vector<const char*> keywords;
   std::vector<const char*> values;
-  for (const auto& [keyword, value] : conninfo.parameters()) {
+  for (const auto& [keyword, value] : conninfo) {
     keywords.push_back(keyword.c_str());
     values.push_back(value.c_str());
   }
