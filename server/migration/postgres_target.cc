@@ -53,18 +53,14 @@ class PostgresTarget : public MigrationTarget {
   }
 
   absl::Status Finish(const MigrationSource& source) override {
-    std::vector<Statement> statements(1);
-    statements[0] = {.text = "DROP TABLE hulld.migration"};
-    return Transact(std::move(statements), source.revision, {});
+    return Transact({{.text = "DROP TABLE hulld.migration"}}, source.revision, {});
   }
 
  private:
   // revision: of the store after the transaction. added: change of its totals.
   absl::Status Transact(std::vector<Statement> statements, uint64_t revision,
                         const StoreTotals& added) {
-    std::vector<Statement> all(1);
-    all[0] = {.text = "BEGIN"};
-    all.push_back(store_->Fence(revision, added));
+    std::vector<Statement> all = {{.text = "BEGIN"}, store_->Fence(revision, added)};
     std::ranges::move(statements, std::back_inserter(all));
     all.push_back({.text = "COMMIT"});
     absl::Status status = store_->writer().AskToCommit(all).status();

@@ -93,31 +93,17 @@ class Registry {
 
   // Creates, deletes, replaces, and grows hulls and bodies.
   LocalChanges& changes() { return changes_; }
-  // Finds bodies.
+  // Finds bodies, and lists hulls and bodies.
   RecordReader& records() { return records_; }
   // Serves hulls that are resolved repeatedly or without blocking, and their snapshots.
   HullReader& reader() { return reader_; }
-  // Waits for freshness. Required before functions without a freshness parameter: List and
-  // RecordReader::FindBodies.
+  // Waits for freshness. Required before functions without a freshness parameter: those of
+  // records().
   ReadBarrier& barrier() { return barrier_; }
   // True if peer servers commit to the same store, so that reads may wait for their changes.
   bool has_peers() const { return barrier_.has_peers(); }
   // False if no body exists. Takes no lock.
   bool has_bodies() const { return state_.BodyCount() > 0; }
-
-  // Returns at most `page_size` hulls, or bodies, or both, with IDs that start with `prefix` and
-  // follow `after` in byte order; a page of bodies may contain fewer even if more follow. If the
-  // store finds records, queries the store, and must not run on a gRPC thread. UNAVAILABLE: the
-  // store cannot be read. CANCELLED: should_stop returned true.
-  absl::StatusOr<RecordPage> List(std::string prefix, std::string after, size_t page_size,
-                                  const std::function<bool()>& should_stop = {},
-                                  RecordKinds kinds = {.hulls = true}) {
-    return records_.List({.prefix = std::move(prefix),
-                          .kinds = kinds,
-                          .after = std::move(after),
-                          .page_size = page_size},
-                         should_stop);
-  }
 
   // Puts small hulls to rest that have not been looked up since the previous call of this function
   // (HullTable). Call every few seconds. Cost: about 0.2 us per hull.

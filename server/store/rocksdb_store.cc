@@ -54,15 +54,6 @@ void PutBase(rocksdb::WriteBatch& batch, const Change& change) {
   }
 }
 
-void EncodeBody(rocksdb::WriteBatch& batch, const StoredBody& body, bool deleted) {
-  const std::string key = BodyKey(body.record.body_id);
-  if (deleted) {
-    batch.Delete(key);
-  } else {
-    PutSealed(batch, key, EncodeStoredBody(body));
-  }
-}
-
 // Returns true if the change deletes or replaces a hull with a damaged record. EncodeChange does
 // not find the other values of such a hull.
 bool EndsUnknown(const Change& change) {
@@ -74,7 +65,12 @@ bool EndsUnknown(const Change& change) {
 }  // namespace
 
 void EncodeChange(rocksdb::WriteBatch& batch, const Change& change) {
-  if (change.body != nullptr) return EncodeBody(batch, *change.body, change.deleted);
+  if (change.body != nullptr) {
+    const std::string key = BodyKey(change.id());
+    if (!change.deleted) return PutSealed(batch, key, EncodeStoredBody(*change.body));
+    batch.Delete(key);
+    return;
+  }
   const HullRecord& record = change.hull.record;
   const std::string hull_key = HullKey(record.hull_id);
   if (change.replaced.has_value()) {

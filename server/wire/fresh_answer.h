@@ -58,7 +58,7 @@ void EndListed(Registry& registry, TaskPool& pool, UnaryCall* call, Rpc rpc, Rec
                            DecodePageToken(rpc, request.page_token(), prefix));
     const uint32_t asked =
         request.page_size() == 0 ? Config::kDefaultPageSize : request.page_size();
-    const absl::StatusOr<RecordPage> page = registry.List(
+    const absl::StatusOr<RecordPage> page = registry.records().List(
         prefix, after, std::min(asked, Config::kMaxPageSize),
         [call] { return call->call().ShouldStop(); }, kinds);
     if (!page.ok()) return page.status();

@@ -10,6 +10,7 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -156,6 +157,24 @@ class Locked {
       if (Stopped(should_stop)) return Cancelled();
     }
     return absl::OkStatus();
+  }
+
+  // Calls start(done), then blocks as Await until done(result) has been called with the mutex held,
+  // perhaps on another thread, and returns the result.
+  template <typename Result, typename Start>
+  Result AwaitResult(const std::function<bool()>& should_stop, const Start& start) {
+    struct Wait {
+      ConditionVariable changed;
+      std::optional<Result> result;
+    };
+    const auto wait = std::make_shared<Wait>();
+    start([wait](Result result) {
+      wait->result = std::move(result);
+      wait->changed.notify_all();
+    });
+    absl::Status s = Await(wait->changed, should_stop, [&] { return wait->result.has_value(); });
+    if (!s.ok()) return s;
+    return *std::move(wait->result);
   }
 
   // Counts a lookup within this hold of the mutex.

@@ -3,7 +3,6 @@
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
-#include <memory>
 #include <utility>
 
 #include "core/base/check.h"
@@ -49,18 +48,9 @@ void ReadBarrier::End() {
 }
 
 absl::Status ReadBarrier::AwaitCommits(Locked& locked, const std::function<bool()>& should_stop) {
-  struct Wait {
-    ConditionVariable changed;
-    std::optional<absl::Status> status;
-  };
-  const auto wait = std::make_shared<Wait>();
-  committer_.StartBarrier(locked, [wait](Locked&, const absl::Status& status) {
-    wait->status = status;
-    wait->changed.notify_all();
+  return locked.AwaitResult<absl::Status>(should_stop, [&](const auto& done) {
+    committer_.StartBarrier(locked, [done](Locked&, const absl::Status& s) { done(s); });
   });
-  HULLD_RETURN_IF_ERROR(
-      locked.Await(wait->changed, should_stop, [&] { return wait->status.has_value(); }));
-  return *wait->status;
 }
 
 absl::Status ReadBarrier::AwaitPeers(const std::function<bool()>& should_stop) {
@@ -121,11 +111,15 @@ void ReadBarrier::StartFetch(std::function<void(const absl::Status&)> done) {
 void ReadBarrier::WhenFresh(Refusal refuse, LockedTask next) {
   Locked locked(state_.mutex);
   if (!has_peers()) return next(locked);
-  committer_.AddBarrier([refuse = std::move(refuse), next = std::move(next)](
-                            Locked& later, const absl::Status& status) {
-    if (status.ok()) return next(later);
-    later.Afterwards([refuse, status] { refuse(status); });
-  });
+  committer_.AddBarrier(RunOrRefuse(std::move(refuse), std::move(next)));
+}
+
+Committer::Barrier ReadBarrier::RunOrRefuse(Refusal refuse, LockedTask next) {
+  return [refuse = std::move(refuse), next = std::move(next)](Locked& locked,
+                                                              const absl::Status& status) {
+    if (status.ok()) return next(locked);
+    locked.Afterwards([refuse, status] { refuse(status); });
+  };
 }
 
 void ReadBarrier::Defer(LockedTask task) {

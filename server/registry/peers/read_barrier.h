@@ -68,7 +68,7 @@ class ReadBarrier : public Committer::Peers {
   absl::Status AwaitCommits(Locked& locked, const std::function<bool()>& should_stop);
 
   // Read barrier: blocks until all changes that peer servers committed before the call are applied.
-  // Required before functions without a freshness parameter (Registry::List,
+  // Required before functions without a freshness parameter (RecordReader::List,
   // RecordReader::FindBodies). Not for gRPC threads. Errors and cost as AwaitCommits; no effect
   // without peer servers.
   absl::Status AwaitPeers(const std::function<bool()>& should_stop);
@@ -92,6 +92,8 @@ class ReadBarrier : public Committer::Peers {
   // Runs `next`, which determines the answer to a call, after the changes committed by peer servers
   // so far are applied; or calls `refuse` with the error, without holding a lock.
   void WhenFresh(Refusal refuse, LockedTask next);
+  // Returns a function that runs `next`, or calls `refuse` with the error, without holding a lock.
+  static Committer::Barrier RunOrRefuse(Refusal refuse, LockedTask next);
 
   // Defers a task, which depends on an ID that a peer server changed, until that change is applied.
   // Requires has_peers().

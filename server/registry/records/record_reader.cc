@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <span>
 #include <utility>
 
@@ -36,16 +35,17 @@ absl::Status IsAhead(uint64_t found, uint64_t known) {
 
 }  // namespace
 
-void RecordReader::WhenKnown(Locked& locked, const std::string& id, Refusal refuse,
-                             LockedTask next) {
-  HULLD_CHECK(locked.Holds(state_.mutex) && !state_.IsKnown(id));
+std::pair<std::shared_ptr<RecordReader::Reading>, bool> RecordReader::Join(const std::string& id) {
   std::shared_ptr<Reading>& reading = readings_[id];
   const bool is_new = reading == nullptr;
-  if (is_new) {
-    reading = std::make_shared<Reading>();
-    reading->id = id;
-  }
-  reading->waiting.emplace_back(std::move(refuse), std::move(next));
+  if (is_new) reading = std::make_shared<Reading>(Reading{id, {}});
+  return {reading, is_new};
+}
+
+void RecordReader::WhenKnown(const std::string& id, Committer::Barrier done) {
+  HULLD_CHECK(!state_.IsKnown(id));
+  const auto [reading, is_new] = Join(id);
+  reading->waiting.push_back(std::move(done));
   if (!is_new) return;
   due_.push_back(reading);
   if (threads_ == kMaxThreads) return;
@@ -62,7 +62,7 @@ void RecordReader::WhenReady(const std::string& id, For need, Refusal refuse, Ta
 void RecordReader::RunWhenReady(Locked& locked, const std::shared_ptr<const ReadyTask>& ready) {
   const LockedTask again = [this, ready](Locked& later) { RunWhenReady(later, ready); };
   const std::string& id = ready->id;
-  if (!state_.IsKnown(id)) return WhenKnown(locked, id, ready->refuse, again);
+  if (!state_.IsKnown(id)) return WhenKnown(id, ReadBarrier::RunOrRefuse(ready->refuse, again));
   BodyTable::Entry* const body = state_.bodies.Find(id);
   if (body != nullptr && body->in_flight) return body->waiting.push_back(again);
   if (const HullPointer hull = state_.Find(id); hull != nullptr) {
@@ -104,18 +104,14 @@ absl::Status RecordReader::AwaitKnown(Locked& locked, std::span<const std::strin
       if (awaited == nullptr) return absl::OkStatus();
       continue;
     }
-    std::shared_ptr<Reading>& reading = readings_[*id];
-    if (reading == nullptr) {
-      reading = std::make_shared<Reading>();
-      reading->id = *id;
-      own.push_back(reading);
-    }
+    const auto [reading, is_new] = Join(*id);
+    if (is_new) own.push_back(reading);
     if (awaited == nullptr) awaited = reading;
   }
-  if (!own.empty()) ReadRecords(locked, own);
-  HULLD_RETURN_IF_ERROR(
-      locked.Await(awaited->over, should_stop, [&] { return awaited->is_over; }));
-  return awaited->status;
+  return locked.AwaitResult<absl::Status>(should_stop, [&](const auto& done) {
+    awaited->waiting.push_back([done](Locked&, const absl::Status& s) { done(s); });
+    if (!own.empty()) ReadRecords(locked, own);
+  });
 }
 
 // As AwaitKnown for the unknown ones among `ids`, which must include the first.
@@ -179,11 +175,15 @@ void RecordReader::TakeRecords(Locked& locked, const Readings& readings,
   state_.bodies.DropSome(locked);
   Readings open;
   for (const auto& reading : readings) {
-    if (reading->is_over) continue;
+    const auto current = readings_.find(reading->id);
+    if (current == readings_.end() || current->second != reading) continue;
     if (found.ok()) TakeRecord(locked, reading->id, *found);
+    readings_.erase(current);
     open.push_back(reading);
   }
-  for (const auto& reading : open) EndReading(locked, *reading, found.status());
+  for (const auto& reading : open) {
+    for (const Committer::Barrier& done : reading->waiting) done(locked, found.status());
+  }
 }
 
 void RecordReader::TakeRecord(Locked& locked, const std::string& id, const FoundRecords& found) {
@@ -198,30 +198,15 @@ void RecordReader::TakeRecord(Locked& locked, const std::string& id, const Found
   state_.AddStored(id, hull->second);
 }
 
-void RecordReader::EndReading(Locked& locked, Reading& reading, const absl::Status& status) {
-  reading.is_over = true;
-  reading.status = status;
-  reading.over.notify_all();
-  readings_.erase(reading.id);
-  for (auto& [refuse, next] : std::exchange(reading.waiting, {})) {
-    if (status.ok()) {
-      next(locked);
-    } else {
-      locked.Afterwards([refuse = std::move(refuse), status] { refuse(status); });
-    }
-  }
-}
-
 void RecordReader::OnPeerChange(Locked& /*locked*/, const std::string& id,
                                 const HullPointer& /*hull*/) {
   const auto found = readings_.find(id);
   if (found == readings_.end()) return;
-  const std::shared_ptr<Reading> reading = found->second;
   if (!state_.IsKnown(id)) state_.hulls.NoteAbsent(id);
-  reading->is_over = true;
-  reading->over.notify_all();
+  for (Committer::Barrier& done : found->second->waiting) {
+    barrier_.Defer([done = std::move(done)](Locked& later) { done(later, absl::OkStatus()); });
+  }
   readings_.erase(found);
-  for (auto& [refuse, next] : std::exchange(reading->waiting, {})) barrier_.Defer(std::move(next));
 }
 
 void RecordReader::WhenReached(Locked& locked, uint64_t asked_at,
@@ -267,8 +252,14 @@ absl::StatusOr<FoundRecords> RecordReader::Query(const PageRequest& request) {
   return found;
 }
 
-absl::StatusOr<RecordPage> RecordReader::List(const PageRequest& request,
-                                              const std::function<bool()>& should_stop) {
+absl::StatusOr<RecordPage> RecordReader::List(std::string prefix, std::string after,
+                                              size_t page_size,
+                                              const std::function<bool()>& should_stop,
+                                              RecordKinds kinds) {
+  const PageRequest request = {.prefix = std::move(prefix),
+                               .kinds = kinds,
+                               .after = std::move(after),
+                               .page_size = page_size};
   Locked locked(state_.mutex);
   if (!state_.is_cache()) return CataloguedPage(request);
   if (request.kinds.bodies) {
@@ -278,19 +269,12 @@ absl::StatusOr<RecordPage> RecordReader::List(const PageRequest& request,
   locked.Unlock();
   absl::StatusOr<FoundRecords> found = Query(request);
   locked.Lock();
-  struct Wait {
-    ConditionVariable over;
-    std::optional<absl::StatusOr<RecordPage>> page;
-  };
-  const auto wait = std::make_shared<Wait>();
-  WhenReached(locked, asked_at, std::move(found),
-              [this, wait](Locked&, const absl::StatusOr<FoundRecords>& reached) {
-                wait->page = Describe(reached);
-                wait->over.notify_all();
-              });
-  HULLD_RETURN_IF_ERROR(
-      locked.Await(wait->over, should_stop, [&] { return wait->page.has_value(); }));
-  return *std::move(wait->page);
+  return locked.AwaitResult<absl::StatusOr<RecordPage>>(should_stop, [&](const auto& done) {
+    WhenReached(locked, asked_at, std::move(found),
+                [this, done](Locked&, const absl::StatusOr<FoundRecords>& reached) {
+                  done(Describe(reached));
+                });
+  });
 }
 
 // The registry may know more about this version than its record: its box, or its damage.

@@ -14,7 +14,6 @@
 #include <vector>
 
 #include "server/process/fair_queue.h"
-#include "server/process/synchronization.h"
 #include "server/process/task_pool.h"
 #include "server/registry/commit/committer.h"
 #include "server/registry/memory/locked.h"
@@ -78,22 +77,22 @@ class RecordReader : public PeerChangeListener, public PageSource {
   // Ends the read of the ID; its tasks look the ID up again.
   void OnPeerChange(Locked& locked, const std::string& id, const HullPointer& hull) override;
 
-  // As Registry::List, for a request by prefix. May query the store on this thread. Requires that
-  // the thread does not hold the mutex (not checked: a mutex does not know its holder).
-  absl::StatusOr<RecordPage> List(const PageRequest& request,
-                                  const std::function<bool()>& should_stop);
+  // Returns at most `page_size` hulls, or bodies, or both, with IDs that start with `prefix` and
+  // follow `after` in byte order; a page of bodies may contain fewer even if more follow. If the
+  // store finds records, queries the store, and must not run on a gRPC thread. UNAVAILABLE: the
+  // store cannot be read. CANCELLED: should_stop returned true.
+  absl::StatusOr<RecordPage> List(std::string prefix, std::string after, size_t page_size,
+                                  const std::function<bool()>& should_stop = {},
+                                  RecordKinds kinds = {.hulls = true});
 
   void ReadPage(Locked& locked, PageRequest request,
                 std::function<void(Locked&, absl::StatusOr<RecordPage>)> done) override;
 
  private:
+  // A read of a record. Its callers wait for the registry's mutex, with the error of the read.
   struct Reading {
     std::string id;
-    bool is_over = false;
-    // Error of the read.
-    absl::Status status;
-    ConditionVariable over;
-    std::vector<std::pair<Refusal, LockedTask>> waiting;
+    std::vector<Committer::Barrier> waiting;
   };
   // Arguments of WhenReady.
   struct ReadyTask {
@@ -106,9 +105,11 @@ class RecordReader : public PeerChangeListener, public PageSource {
   // Called with the registry's mutex held, with the records valid from then on, or an error.
   using FoundTaker = std::function<void(Locked&, const absl::StatusOr<FoundRecords>&)>;
 
-  // Reads the record of an ID, then runs `next`, which must check again that the ID is known; or
-  // refuses, without the mutex. Requires: the ID is unknown.
-  void WhenKnown(Locked& locked, const std::string& id, Refusal refuse, LockedTask next);
+  // Returns the read of the record of an ID, and true if it is new.
+  std::pair<std::shared_ptr<Reading>, bool> Join(const std::string& id);
+  // Reads the record of an ID, then calls `done`, which must check again that the ID is known.
+  // Requires: the ID is unknown.
+  void WhenKnown(const std::string& id, Committer::Barrier done);
   absl::Status AwaitMissing(Locked& locked, std::span<const std::string> ids,
                             const std::function<bool()>& should_stop);
   void RunWhenReady(Locked& locked, const std::shared_ptr<const ReadyTask>& ready);
@@ -117,7 +118,6 @@ class RecordReader : public PeerChangeListener, public PageSource {
   void TakeRecords(Locked& locked, const Readings& readings,
                    const absl::StatusOr<FoundRecords>& found);
   void TakeRecord(Locked& locked, const std::string& id, const FoundRecords& found);
-  void EndReading(Locked& locked, Reading& reading, const absl::Status& status);
 
   // Passes `found` to `take`, now or on the committer's thread. asked_at: the registry's revision
   // at the time of the store query. UNAVAILABLE: the store went back, or cannot report the changes

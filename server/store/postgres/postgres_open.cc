@@ -166,8 +166,10 @@ constexpr char kPrepareReads[] = R"(
       WHERE hull_id = $1 AND incarnation = $2 AND revision > $3 AND revision <= $4
       ORDER BY revision;
     PREPARE hulld_sequence(text, bigint, text) AS
-      SELECT sequence FROM hulld.writers
-      WHERE hull_id = $1 AND incarnation = $2 AND writer_id = $3;
+      SELECT w.sequence, h.record FROM hulld.hulls h
+      LEFT JOIN hulld.writers w
+        ON w.hull_id = h.hull_id AND w.incarnation = $2 AND w.writer_id = $3
+      WHERE h.hull_id = $1;
     PREPARE hulld_writers(text, bigint) AS
       SELECT writer_id, sequence FROM hulld.writers
       WHERE hull_id = $1 AND incarnation = $2 ORDER BY writer_id;)";

@@ -90,7 +90,7 @@ TEST_F(RegistryInterleaving, ManyHullsAreReadByManyThreads) {
   }
   // Each eviction asks only a few hulls.
   for (int i = 0; i < kHulls; ++i) DropAll();
-  store_.Lose(registry_.List(ids[kLost], "", 1)->entries[0].record);
+  store_.Lose(registry_.records().List(ids[kLost], "", 1)->entries[0].record);
   Gate gate;
   store_.before_load.Set([&] { gate.Stop(); });
   auto reader = StartResolve(ids, {});
@@ -299,7 +299,7 @@ TEST_F(RegistryInterleaving, PointsThatTheStoreLostAreDamageForReadersAndWriters
   const AppendSession session = Open("h", "w");
   ASSERT_TRUE(Append(session, 1, CubeCorners()).ok());
   DropAll();
-  store_.Lose(registry_.List("", "", 1)->entries[0].record);
+  store_.Lose(registry_.records().List("", "", 1)->entries[0].record);
   EXPECT_TRUE(absl::IsDataLoss(registry_.Resolve("h", {}).status()));
   EXPECT_TRUE(absl::IsDataLoss(Append(session, 2, {{9, 9, 9}}).status()));
   EXPECT_EQ(registry_.Cache().damaged, 1);
@@ -311,7 +311,7 @@ TEST_F(RegistryInterleaving, PointsOfAnotherDimensionAreDamage) {
   const AppendSession session = Open("h", "w");
   ASSERT_TRUE(Append(session, 1, CubeCorners()).ok());
   DropAll();
-  store_.Flatten(registry_.List("", "", 1)->entries[0].record);
+  store_.Flatten(registry_.records().List("", "", 1)->entries[0].record);
   EXPECT_TRUE(absl::IsDataLoss(registry_.Resolve("h", {}).status()));
   EXPECT_TRUE(absl::IsDataLoss(Append(session, 2, {{9, 9, 9}}).status()));
 }

@@ -90,7 +90,7 @@ TEST(RegistryListing, InsidePointsInFlightAreSeenByAllReadsOrNone) {
     store.Hold(false);
     return false;
   };
-  const absl::StatusOr<RecordPage> page = registry.List("", "", 10, release);
+  const absl::StatusOr<RecordPage> page = registry.records().List("", "", 10, release);
   const absl::StatusOr<HullView> view = hulls.View("h");
   store.Hold(false);
   ASSERT_TRUE(page.ok() && view.ok());

@@ -21,7 +21,7 @@ TEST_F(RegistryMemory, HullsAreReadAtFirstUse) {
   for (int i = 0; i < 10; ++i) ASSERT_TRUE(hulls_->Put(std::to_string(i), CubeCorners()).ok());
   Start();
   EXPECT_EQ(hulls_->registry().Cache().bytes, 0);
-  EXPECT_EQ(hulls_->registry().List("", "", 100)->entries.size(), 10);
+  EXPECT_EQ(hulls_->registry().records().List("", "", 100)->entries.size(), 10);
   EXPECT_EQ(hulls_->registry().Cache().loads, 0);
   ASSERT_TRUE(hulls_->View("3").ok());
   EXPECT_EQ(hulls_->registry().Cache().loads, 1);
@@ -481,7 +481,7 @@ TEST(RegistryOfMemoryStore, AnIdleHullComesBackAsItWas) {
   // Threads of the last change may hold the hull a little longer.
   while (registry.Cache().bytes >= awake / 2) registry.RestIdleHulls();
   EXPECT_GE(registry.Cache().writing_bytes, 9 * sizeof(Vector));
-  EXPECT_EQ(registry.List("", "", 10)->entries.front().record, record);
+  EXPECT_EQ(registry.records().List("", "", 10)->entries.front().record, record);
   const HullView view = *hulls.View("h");
   EXPECT_EQ(view.record, record);
   EXPECT_EQ(CanonicalOf(view).vertices().size(), record.vertex_count);

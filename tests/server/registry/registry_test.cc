@@ -160,7 +160,7 @@ TEST_F(RegistryTest, AReaderDoesNotWaitForTheChunkInProgress) {
     EXPECT_TRUE(view.ok());
     EXPECT_EQ(view->second.served->query_hull().point_count(), 1);
     EXPECT_EQ(CanonicalOf(view->second).vertices().size(), 1);
-    EXPECT_EQ(registry_.List("", "", 10)->entries.size(), 1);
+    EXPECT_EQ(registry_.records().List("", "", 10)->entries.size(), 1);
     return false;
   });
   EXPECT_TRUE(result.ok());
@@ -323,7 +323,7 @@ TEST_F(RegistryTest, ADeletionWaitsForTheChunkInProgressAndRefusesTheNext) {
                                [&](absl::StatusOr<uint64_t> reply) { deleted.set_value(reply); });
       registry_.changes().Append(session, {2, {{0, 1, 0}}, std::nullopt}, {}, {},
                                [&](absl::StatusOr<ChunkResult> reply) { next.set_value(reply); });
-      EXPECT_EQ(registry_.List("", "", 10)->entries.size(), 1);
+      EXPECT_EQ(registry_.records().List("", "", 10)->entries.size(), 1);
     }
     return false;
   });

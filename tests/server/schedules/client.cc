@@ -223,7 +223,7 @@ void Client::List() {
     if (MayFail(call, fresh, false)) return;
     Fail(call, absl::StrCat("unexpected error: ", fresh.ToString()));
   }
-  const absl::StatusOr<RecordPage> listed_page = simulation_.registry.List("", "", kHulls);
+  const absl::StatusOr<RecordPage> listed_page = simulation_.registry.records().List("", "", kHulls);
   if (!listed_page.ok()) {
     if (MayFail(call, listed_page.status(), false)) return;
     Fail(call, absl::StrCat("unexpected error: ", listed_page.status().ToString()));

@@ -166,7 +166,7 @@ void Client::ListBodies() {
     Fail(call, absl::StrCat("unexpected error: ", fresh.ToString()));
   }
   const absl::StatusOr<RecordPage> page =
-      simulation_.registry.List("", "", kHulls, {}, {.bodies = true});
+      simulation_.registry.records().List("", "", kHulls, {}, {.bodies = true});
   ++simulation_.reached.answers;
   if (!page.ok()) {
     if (MayFail(call, page.status(), false)) return;

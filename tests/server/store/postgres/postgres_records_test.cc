@@ -99,7 +99,7 @@ TEST_F(PostgresRecords, AnUnmatchedPrefixListsNothing) {
   FillSome();
   for (const std::string& prefix : {std::string("a\0", 2), std::string("\xff\xfe"),
                                     std::string("\xc3\xa9"), std::string("a b")}) {
-    const auto page = hulls_->registry().List(prefix, "", 10, {});
+    const auto page = hulls_->registry().records().List(prefix, "", 10, {});
     ASSERT_TRUE(page.ok()) << page.status();
     EXPECT_TRUE(page->entries.empty());
   }
@@ -185,7 +185,7 @@ TEST_F(PostgresRecords, APageOfLargeBodiesIsShortAndHasANextPage) {
   size_t pages = 0;
   for (std::string after;;) {
     const absl::StatusOr<RecordPage> page =
-        hulls_->registry().List("large-", after, 1000, {}, {.bodies = true});
+        hulls_->registry().records().List("large-", after, 1000, {}, {.bodies = true});
     ASSERT_TRUE(page.ok()) << page.status();
     ASSERT_FALSE(page->entries.empty());
     ++pages;
@@ -322,7 +322,7 @@ TEST_F(PostgresRecords, AListIsReadPageByPage) {
   Start();
   std::vector<std::string> listed;
   for (std::string after;;) {
-    const absl::StatusOr<RecordPage> page = hulls_->registry().List("", after, 1);
+    const absl::StatusOr<RecordPage> page = hulls_->registry().records().List("", after, 1);
     ASSERT_TRUE(page.ok()) << page.status();
     ASSERT_EQ(page->entries.size(), 1);
     after = page->entries.front().record.hull_id;
@@ -330,9 +330,9 @@ TEST_F(PostgresRecords, AListIsReadPageByPage) {
     if (!page->more) break;
   }
   EXPECT_EQ(listed, (std::vector<std::string>{"a", "b", "c"}));
-  EXPECT_FALSE(hulls_->registry().List("b", "", 10)->more);
-  EXPECT_EQ(hulls_->registry().List("b", "", 10)->entries.size(), 1);
-  EXPECT_TRUE(hulls_->registry().List("", "c", 10)->entries.empty());
+  EXPECT_FALSE(hulls_->registry().records().List("b", "", 10)->more);
+  EXPECT_EQ(hulls_->registry().records().List("b", "", 10)->entries.size(), 1);
+  EXPECT_TRUE(hulls_->registry().records().List("", "c", 10)->entries.empty());
 }
 
 // One hull is not in memory, one is known to be deleted, one was recreated, and one was recreated

@@ -97,7 +97,7 @@ class PostgresShared : public PostgresTest {
   static std::vector<std::string> Listed(PostgresRegistry& server) {
     EXPECT_TRUE(server.registry().barrier().AwaitPeers({}).ok());
     std::vector<std::string> ids;
-    const absl::StatusOr<RecordPage> page = server.registry().List("", "", 100);
+    const absl::StatusOr<RecordPage> page = server.registry().records().List("", "", 100);
     EXPECT_TRUE(page.ok()) << page.status();
     if (!page.ok()) return ids;
     for (const HullChange& hull : page->entries) {
