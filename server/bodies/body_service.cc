@@ -114,9 +114,8 @@ UnaryReactor* BodyService::ListBodies(CallContext* context, const Bytes* request
 
 UnaryReactor* BodyService::DeleteBody(CallContext* context, const Bytes* request, Bytes* response) {
   return DeleteCall::Start(
-      *context, admission_, Rpc::kDeleteBody, {request, response}, [this](DeleteCall* call) {
-        EndDeleted(registry_, call, "body", call->request().body_id());
-      });
+      *context, admission_, Rpc::kDeleteBody, {request, response},
+      [this](DeleteCall* call) { EndDeleted(registry_, call, "body", call->request().body_id()); });
 }
 
 void BodyService::Put(PutCall* call) {

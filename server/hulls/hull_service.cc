@@ -72,9 +72,8 @@ UnaryReactor* HullService::ListHulls(CallContext* context, const Bytes* request,
 
 UnaryReactor* HullService::DeleteHull(CallContext* context, const Bytes* request, Bytes* response) {
   return DeleteCall::Start(
-      *context, admission_, Rpc::kDeleteHull, {request, response}, [this](DeleteCall* call) {
-        EndDeleted(registry_, call, "hull", call->request().hull_id());
-      });
+      *context, admission_, Rpc::kDeleteHull, {request, response},
+      [this](DeleteCall* call) { EndDeleted(registry_, call, "hull", call->request().hull_id()); });
 }
 
 WriteReactor* HullService::WatchHulls(CallContext* context, const Bytes* request) {

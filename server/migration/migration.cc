@@ -17,35 +17,6 @@ namespace {
 constexpr size_t kMaxVertices = 1'000'000;
 constexpr size_t kMaxChanges = 1000;
 
-// Changes sent to the target together.
-class Batch {
- public:
-  explicit Batch(MigrationTarget& target) : target_(target) {}
-
-  // Adds all changes of a hull, or of a body.
-  absl::Status Add(std::vector<Change> changes) {
-    for (Change& change : changes) {
-      vertices_ += change.vertices.size();
-      changes_.push_back(std::move(change));
-    }
-    return vertices_ >= kMaxVertices || changes_.size() >= kMaxChanges ? Flush() : absl::OkStatus();
-  }
-  absl::Status Flush() {
-    if (changes_.empty()) return absl::OkStatus();
-    std::vector<const Change*> pointers;
-    for (const Change& change : changes_) pointers.push_back(&change);
-    absl::Status status = target_.Add(pointers);
-    changes_.clear();
-    vertices_ = 0;
-    return status;
-  }
-
- private:
-  MigrationTarget& target_;
-  std::vector<Change> changes_;
-  size_t vertices_ = 0;
-};
-
 absl::Status Differs(const std::string& id, const std::string& what) {
   return absl::DataLossError(absl::StrCat("\"", id, "\" differs in the copy: ", what));
 }
@@ -71,22 +42,6 @@ bool HasSameBits(const Vector& a, const Vector& b) {
   return std::equal(a.data(), a.data() + 3, b.data(), [](double x, double y) {
     return std::bit_cast<uint64_t>(x) == std::bit_cast<uint64_t>(y);
   });
-}
-
-// Greatest IDs of a store's hulls and bodies; the copied ones are contiguous up to these.
-struct LastCopied {
-  std::string hull_id;
-  std::string body_id;
-};
-
-absl::StatusOr<LastCopied> FindLastCopied(Store& store) {
-  LastCopied last;
-  absl::Status status =
-      store.ForEachHull([&](const std::string& id, const auto&) { last.hull_id = id; });
-  if (!status.ok()) return status;
-  status = store.ForEachBody([&](const std::string& id, const auto&) { last.body_id = id; });
-  if (!status.ok()) return status;
-  return last;
 }
 
 absl::StatusOr<std::vector<WriterSequence>> ReadWriters(Store& store, const StoredHull& hull) {
@@ -143,10 +98,25 @@ absl::Status Migration::Prepare(MigrationTarget& target) {
 }
 
 absl::StatusOr<MigrationCounts> Migration::CopyTo(MigrationTarget& target) {
-  MigrationCounts counts;
   HULLD_RETURN_IF_ERROR(Prepare(target));
-  HULLD_ASSIGN_OR_RETURN(const LastCopied last, FindLastCopied(target.store()));
-  Batch batch(target);
+  // Greatest IDs in the target: its hulls and bodies are contiguous up to these.
+  std::string last_hull;
+  std::string last_body;
+  HULLD_RETURN_IF_ERROR(
+      target.store().ForEachHull([&](const std::string& id, const auto&) { last_hull = id; }));
+  HULLD_RETURN_IF_ERROR(
+      target.store().ForEachBody([&](const std::string& id, const auto&) { last_body = id; }));
+  MigrationCounts counts;
+  std::vector<Change> pending;
+  size_t vertices = 0;
+  const auto flush = [&] {
+    std::vector<const Change*> changes;
+    for (const Change& change : pending) changes.push_back(&change);
+    absl::Status status = changes.empty() ? absl::OkStatus() : target.Add(changes);
+    pending.clear();
+    vertices = 0;
+    return status;
+  };
   const auto copy = [&](const auto& records, const std::string& last_id,
                         uint64_t* count) -> absl::Status {
     for (const auto& each : records) {
@@ -156,13 +126,19 @@ absl::StatusOr<MigrationCounts> Migration::CopyTo(MigrationTarget& target) {
         continue;
       }
       HULLD_ASSIGN_OR_RETURN(std::vector<Change> changes, ChangesOf(each));
-      HULLD_RETURN_IF_ERROR(batch.Add(std::move(changes)));
+      for (Change& change : changes) {
+        vertices += change.vertices.size();
+        pending.push_back(std::move(change));
+      }
+      if (vertices >= kMaxVertices || pending.size() >= kMaxChanges) {
+        HULLD_RETURN_IF_ERROR(flush());
+      }
       progress_(counts.hulls + counts.bodies, all());
     }
-    return batch.Flush();
+    return flush();
   };
-  HULLD_RETURN_IF_ERROR(copy(hulls_, last.hull_id, &counts.hulls));
-  HULLD_RETURN_IF_ERROR(copy(bodies_, last.body_id, &counts.bodies));
+  HULLD_RETURN_IF_ERROR(copy(hulls_, last_hull, &counts.hulls));
+  HULLD_RETURN_IF_ERROR(copy(bodies_, last_body, &counts.bodies));
   return counts;
 }
 

@@ -13,8 +13,7 @@
 #include <vector>
 
 #include "core/numeric/vector.h"
-#include "server/store/body_record.h"
-#include "server/store/hull_record.h"
+#include "server/store/records.h"
 
 namespace hulld::server {
 

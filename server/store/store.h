@@ -14,9 +14,8 @@
 #include <vector>
 
 #include "core/hull/hull.h"
-#include "server/store/body_record.h"
-#include "server/store/hull_record.h"
 #include "server/store/peer_feed.h"
+#include "server/store/records.h"
 
 namespace hulld::server {
 

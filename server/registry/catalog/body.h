@@ -22,7 +22,7 @@
 #include "server/registry/catalog/registry_types.h"
 #include "server/registry/memory/locked.h"
 #include "server/registry/memory/memory_budget.h"
-#include "server/store/body_record.h"
+#include "server/store/records.h"
 
 namespace hulld::server {
 

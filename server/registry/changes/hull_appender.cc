@@ -89,19 +89,18 @@ void LocalChanges::OpenAppend(const std::string& id, const std::string& writer_i
                               Reply<OpenResult> done, ClientId client) {
   const auto request = std::make_shared<OpenRequest>(
       OpenRequest{id, writer_id, create_if_absent, std::move(on_gone), std::move(done), client});
-  records_.WhenReady(
-      id, RecordReader::For::kLife, request->done,
-      [=, this](Locked& locked, const LockedTask& again) {
-        const HullPointer hull = state_.Find(request->hull_id);
-        if (hull == nullptr) return OpenNew(locked, request, again);
-        // May query the store.
-        writers_.Submit(
-            [=, this] {
-              Locked later(state_.mutex);
-              OpenExisting(later, hull, request, again);
-            },
-            request->client);
-      });
+  records_.WhenReady(id, RecordReader::For::kLife, request->done,
+                     [=, this](Locked& locked, const LockedTask& again) {
+                       const HullPointer hull = state_.Find(request->hull_id);
+                       if (hull == nullptr) return OpenNew(locked, request, again);
+                       // May query the store.
+                       writers_.Submit(
+                           [=, this] {
+                             Locked later(state_.mutex);
+                             OpenExisting(later, hull, request, again);
+                           },
+                           request->client);
+                     });
 }
 
 // The session opens in the completion of the creation, because the hull may be gone immediately
@@ -151,7 +150,7 @@ void LocalChanges::OpenSession(Locked& locked, const HullPointer& hull, OpenRequ
 
 // Returns the last committed sequence of a writer. May release the mutex to query the store.
 absl::StatusOr<uint64_t> LocalChanges::CommittedSequence(Locked& locked, RegisteredHull& hull,
-                                                        const std::string& writer_id) {
+                                                         const std::string& writer_id) {
   if (const auto known = hull.CommittedSequence(writer_id)) return *known;
   if (!state_.store.keeps_hulls() || hull.committed().writer_count == 0) return 0;
   const HullRecord record = hull.committed().record;
@@ -192,8 +191,8 @@ void LocalChanges::CloseAppend(const AppendSession& session) {
 }
 
 void LocalChanges::Append(const AppendSession& session, Chunk chunk,
-                         std::function<bool()> should_stop, std::function<void()> on_built,
-                         Reply<ChunkResult> done) {
+                          std::function<bool()> should_stop, std::function<void()> on_built,
+                          Reply<ChunkResult> done) {
   Locked locked(state_.mutex);
   const uint64_t bytes = chunk.points.capacity() * sizeof(Vector);
   session.hull->chunks.push_back(
@@ -296,7 +295,7 @@ absl::StatusOr<bool> LocalChanges::CheckChunk(Locked& locked, RegisteredHull& hu
 // Adds a chunk to its hull's builder, without the mutex. On success `head` and the writer's
 // sequence include it.
 absl::StatusOr<LocalChanges::BuiltChunk> LocalChanges::Build(Locked& locked, RegisteredHull& hull,
-                                                           PendingChunk& pending) {
+                                                             PendingChunk& pending) {
   // A reader may have found damage during a release of the mutex.
   if (hull.state.damaged()) return hull.state.damage();
   hull.state.StartBuilding();
@@ -336,7 +335,7 @@ absl::StatusOr<LocalChanges::BuiltChunk> LocalChanges::Build(Locked& locked, Reg
 // Returns the LiveHull to append to. Releases the mutex to read it from the store if it is not in
 // memory. A writer does not wait for a reader that loads the same hull; the first to finish wins.
 absl::StatusOr<std::shared_ptr<LiveHull>> LocalChanges::LiveForWriter(Locked& locked,
-                                                                     RegisteredHull& hull) {
+                                                                      RegisteredHull& hull) {
   if (hull.live() != nullptr) return hull.live();
   HULLD_CHECK(hull.state.in_flight() == 0);
   const StoredHull stored = hull.committed();
@@ -367,7 +366,7 @@ absl::StatusOr<std::shared_ptr<LiveHull>> LocalChanges::LiveForWriter(Locked& lo
 // committed points if it is missing. Appends the new vertices to the LiveHull and fills the change
 // with the data to store. Called without the mutex.
 absl::StatusOr<PointCounts> LocalChanges::AddPoints(PendingChunk& pending, LentBuilder& lent,
-                                                   LiveHull& live, BuiltChunk& built) {
+                                                    LiveHull& live, BuiltChunk& built) {
   Change& change = built.change;
   std::unique_ptr<HullBuilder>& builder = lent.builder;
   if (builder != nullptr && !BringUp(*builder, lent.backlog, change.hull.record)) {
@@ -409,7 +408,7 @@ absl::Status LocalChanges::WhyNotBuilt(RegisteredHull& hull, const absl::Status&
 }
 
 void LocalChanges::SubmitChunk(Locked& locked, const HullPointer& hull, PendingChunk& pending,
-                              BuiltChunk built) {
+                               BuiltChunk built) {
   // If a peer server may commit first, keeps the chunk for a retry.
   std::shared_ptr<PendingChunk> kept;
   const Reply<ChunkResult> done = pending.done;

@@ -103,8 +103,7 @@ void LocalChanges::Delete(const std::string& kind, const std::string& id,
     if (hull == nullptr && body == nullptr) {
       return Answer(locked, done, is_body ? state_.NoSuchBody(id) : state_.NoSuchHull(id));
     }
-    const uint64_t revision =
-        is_body ? body->record().revision : hull->committed().record.revision;
+    const uint64_t revision = is_body ? body->record().revision : hull->committed().record.revision;
     if (if_revision.has_value() && *if_revision != revision) {
       return Answer(locked, done, RevisionMismatch(kind, id, revision, *if_revision));
     }
@@ -147,7 +146,7 @@ void LocalChanges::Replace(Replacement replacement, const Reply<PutHullResult>& 
 
 // Returns OK if the replacement is allowed. former: null if no hull exists.
 absl::Status LocalChanges::CheckReplacement(const RegisteredHull* former,
-                                           const Replacement& replacement) const {
+                                            const Replacement& replacement) const {
   const std::string& id = replacement.hull_id;
   const uint64_t revision = former == nullptr ? 0 : former->committed().record.revision;
   if (replacement.if_revision.value_or(revision) != revision) {
@@ -162,8 +161,8 @@ absl::Status LocalChanges::CheckReplacement(const RegisteredHull* former,
 // Submits a replacement, moving its builder and points. former: null if no hull exists; otherwise
 // quiet. again: called if a peer server changed the ID first.
 void LocalChanges::CommitReplacement(Locked& locked, const HullPointer& former,
-                                    const std::shared_ptr<Replacement>& replacement,
-                                    const Reply<PutHullResult>& done, const LockedTask& again) {
+                                     const std::shared_ptr<Replacement>& replacement,
+                                     const Reply<PutHullResult>& done, const LockedTask& again) {
   Change change = MakeChange(former.get(), *replacement);
   const auto hull = std::make_shared<RegisteredHull>(change.hull, HullState::Creating(),
                                                      state_.store.keeps_hulls(), state_.memory);
@@ -215,21 +214,21 @@ void LocalChanges::PutBody(StoredBody stored, std::optional<uint64_t> if_revisio
         change.begins = created == 0;
         change.replaces_body = change.begins && !is_new;
         SubmitBody(locked, std::move(change),
-               [=, this](Locked& later, const absl::Status& status, const Change& put) {
-                 if (is_new) state_.EndCreatingBody(status.ok());
-                 if (Committer::IsSuperseded(status)) return later.AfterwardsLocked(again);
-                 if (!status.ok()) return Answer(later, done, status);
-                 state_.ApplyBody(later, id, body, put.revision);
-                 Answer(later, done,
-                        PutBodyResult{state_.revision(), body->record(), body->pieces().size(),
-                                      is_new});
-               });
+                   [=, this](Locked& later, const absl::Status& status, const Change& put) {
+                     if (is_new) state_.EndCreatingBody(status.ok());
+                     if (Committer::IsSuperseded(status)) return later.AfterwardsLocked(again);
+                     if (!status.ok()) return Answer(later, done, status);
+                     state_.ApplyBody(later, id, body, put.revision);
+                     Answer(later, done,
+                            PutBodyResult{state_.revision(), body->record(), body->pieces().size(),
+                                          is_new});
+                   });
       });
 }
 
 // Returns OK if the body may be put, including as a replacement.
 absl::Status LocalChanges::CheckPutBody(Locked& locked, const std::string& id,
-                                    std::optional<uint64_t> if_revision) {
+                                        std::optional<uint64_t> if_revision) {
   // The body is already counted.
   HULLD_RETURN_IF_ERROR(state_.memory.Check(locked, MemoryUse::kWriting));
   if (state_.hulls.contains(id)) return IdTaken("hull", id);
@@ -246,28 +245,28 @@ absl::Status LocalChanges::CheckPutBody(Locked& locked, const std::string& id,
 void LocalChanges::SubmitBody(Locked& locked, Change change, Committer::Completion finish) {
   const std::string id = change.body->record.body_id;
   HULLD_CHECK(!std::exchange(state_.bodies.Find(id)->in_flight, true));
-  committer_.Submit(
-      locked, std::move(change),
-      [this, id, finish = std::move(finish)](Locked& later, const absl::Status& status,
-                                             Change& committed) {
-        finish(later, status, committed);
-        BodyTable::Entry& entry = *state_.bodies.Find(id);
-        entry.in_flight = false;
-        std::deque<LockedTask> waiting = std::exchange(entry.waiting, {});
-        // Either a creation was refused, or a deletion was committed.
-        if (entry.committed() == nullptr) state_.EraseBody(later, id);
-        for (LockedTask& next : waiting) {
-          // The peer change must be applied first.
-          Committer::IsSuperseded(status) ? barrier_.Defer(std::move(next)) : next(later);
-        }
-        state_.bodies.DropSome(later);
-      });
+  committer_.Submit(locked, std::move(change),
+                    [this, id, finish = std::move(finish)](
+                        Locked& later, const absl::Status& status, Change& committed) {
+                      finish(later, status, committed);
+                      BodyTable::Entry& entry = *state_.bodies.Find(id);
+                      entry.in_flight = false;
+                      std::deque<LockedTask> waiting = std::exchange(entry.waiting, {});
+                      // Either a creation was refused, or a deletion was committed.
+                      if (entry.committed() == nullptr) state_.EraseBody(later, id);
+                      for (LockedTask& next : waiting) {
+                        // The peer change must be applied first.
+                        Committer::IsSuperseded(status) ? barrier_.Defer(std::move(next))
+                                                        : next(later);
+                      }
+                      state_.bodies.DropSome(later);
+                    });
 }
 
 // Submits a change that follows all earlier changes of its hull. Requires: the state of `hull`
 // counts it as in flight. finish: called after the state's transition, before waiting tasks resume.
 void LocalChanges::Submit(Locked& locked, const HullPointer& hull, Change change,
-                         Committer::Completion finish) {
+                          Committer::Completion finish) {
   HULLD_CHECK(hull->state.in_flight() > 0);
   const auto charge = std::make_shared<MemoryCharge>(state_.memory, MemoryUse::kWriting,
                                                      change.vertices.capacity() * sizeof(Vector));
@@ -318,7 +317,7 @@ void LocalChanges::Advance(Locked& locked, const HullPointer& hull) {
 }
 
 void LocalChanges::OnPeerChange(Locked& /*locked*/, const std::string& /*id*/,
-                               const HullPointer& hull) {
+                                const HullPointer& hull) {
   if (hull != nullptr) barrier_.Defer([this, hull](Locked& later) { Advance(later, hull); });
 }
 

@@ -19,7 +19,7 @@
 #include "server/registry/peers/read_barrier.h"
 #include "server/registry/records/record_reader.h"
 #include "server/registry/state/registry_state.h"
-#include "server/store/body_record.h"
+#include "server/store/records.h"
 
 namespace hulld::server {
 
@@ -55,7 +55,7 @@ class LocalChanges : public PeerChangeListener {
  public:
   // All must outlive this. Chunks are built on `writers`.
   LocalChanges(RegistryState& state, Committer& committer, ReadBarrier& barrier,
-              RecordReader& records, TaskPool& writers)
+               RecordReader& records, TaskPool& writers)
       : state_(state),
         committer_(committer),
         barrier_(barrier),

@@ -147,8 +147,8 @@ class Locked {
     mutex_.BeginHold();
   }
 
-  // Runs the deferred tasks, then blocks until is_over() returns true; `changed` is notified when it
-  // may. CANCELLED: should_stop, which may be empty, returned true.
+  // Runs the deferred tasks, then blocks until is_over() returns true; `changed` is notified when
+  // it may. CANCELLED: should_stop, which may be empty, returned true.
   absl::Status Await(ConditionVariable& changed, const std::function<bool()>& should_stop,
                      const std::function<bool()>& is_over) {
     Yield();

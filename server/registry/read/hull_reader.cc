@@ -128,8 +128,17 @@ absl::Status HullReader::LookUp(Locked& locked, const HullsRead& read, uint32_t 
       }
       if (!plan.may_wait) return WouldWait();
       HULLD_RETURN_IF_ERROR(CheckReaders(locked, read.known));
-      const absl::Status loaded = AwaitPoints(locked, read, *hull, was_missing);
-      if (!loaded.ok()) return NoteFailure(loaded, known);
+      absl::Status loaded;
+      if (was_missing) {
+        loaded = LoadOne(locked, *hull, read.should_stop);
+      } else {
+        // Loads the hulls due next, too.
+        ++state_.statistics.misses;
+        was_missing = true;
+        LoadMany(locked, read);
+      }
+      if (Stopped(read.should_stop)) return Cancelled();
+      if (!loaded.ok() && !hull->state.gone()) return NoteFailure(loaded, known);
       continue;
     }
     const bool prepare = hull->WantsPreparing(plan.expected_questions);
@@ -166,20 +175,6 @@ absl::Status HullReader::AwaitRecord(Locked& locked, const HullsRead& read, uint
   }
   const absl::Status asked = records_.AwaitKnown(locked, wanted, read.should_stop);
   return Stopped(read.should_stop) ? Cancelled() : asked;
-}
-
-// Loads the points of this hull, and at first of the hulls due next. As AwaitRecord otherwise.
-absl::Status HullReader::AwaitPoints(Locked& locked, const HullsRead& read, RegisteredHull& hull,
-                                     bool& was_missing) {
-  absl::Status loaded;
-  if (!std::exchange(was_missing, true)) {
-    ++state_.statistics.misses;
-    LoadMany(locked, read);
-  } else {
-    loaded = LoadOne(locked, hull, read.should_stop);
-  }
-  if (Stopped(read.should_stop)) return Cancelled();
-  return hull.state.gone() ? absl::OkStatus() : loaded;
 }
 
 // Returns true if this reader already has the committed state of the hull.

@@ -30,8 +30,8 @@ namespace hulld::server {
 //
 // A read waits only for the store: for the record of an unknown hull (RecordReader), and for points
 // that are not in memory. One reader loads a hull for all that request it
-// (RegisteredHull::is_loading). Other threads help a read that loads many hulls. A read finishes its
-// own loads before it waits for another read, because that one may be waiting for them.
+// (RegisteredHull::is_loading). Other threads help a read that loads many hulls. A read finishes
+// its own loads before it waits for another read, because that one may be waiting for them.
 //
 // Guarded by the registry's mutex, which this class acquires, and releases to wait and to prepare.
 class HullReader {
@@ -66,8 +66,6 @@ class HullReader {
   absl::Status LookUp(Locked& locked, const HullsRead& read, uint32_t k);
   static absl::Status NoteFailure(const absl::Status& status, KnownHulls::Known& known);
   absl::Status AwaitRecord(Locked& locked, const HullsRead& read, uint32_t k);
-  absl::Status AwaitPoints(Locked& locked, const HullsRead& read, RegisteredHull& hull,
-                           bool& was_missing);
   static bool IsHeld(const KnownHulls::Known& known, const RegisteredHull& hull);
   void NoteView(Locked& locked, const HullPointer& hull, KnownHulls& hulls, uint32_t k,
                 bool was_missing);

@@ -140,9 +140,8 @@ FoundBodies RecordReader::FindBodies(std::span<const std::string> ids,
     const size_t end = std::min<size_t>(first + kMaxLookupsPerHold, ids.size());
     for (size_t i = first; i < end; ++i) {
       while (found.status.ok() && !state_.IsKnown(ids[i])) {
-        found.status = may_wait
-                           ? AwaitMissing(locked, ids.subspan(i, end - i), should_stop)
-                           : WouldWait();
+        found.status =
+            may_wait ? AwaitMissing(locked, ids.subspan(i, end - i), should_stop) : WouldWait();
       }
       // A body that could not be read may be known by now.
       found.bodies[i] = state_.FindBody(ids[i]);
@@ -238,9 +237,8 @@ bool RecordReader::IsBehind(const std::string& id, const absl::StatusOr<StoredHu
 // not yet applied. An answer from them would be followed by an older one from memory.
 bool RecordReader::IsBehind(const FoundRecords& found) const {
   return found.revision > state_.revision() ||
-         std::ranges::any_of(found.hulls, [&](const auto& hull) {
-           return IsBehind(hull.first, hull.second);
-         });
+         std::ranges::any_of(found.hulls,
+                             [&](const auto& hull) { return IsBehind(hull.first, hull.second); });
 }
 
 absl::StatusOr<FoundRecords> RecordReader::Query(const PageRequest& request) {
@@ -294,8 +292,7 @@ HullChange RecordReader::Describe(const std::string& id,
   return described.record == change.record ? described : change;
 }
 
-absl::StatusOr<RecordPage> RecordReader::Describe(
-    const absl::StatusOr<FoundRecords>& found) const {
+absl::StatusOr<RecordPage> RecordReader::Describe(const absl::StatusOr<FoundRecords>& found) const {
   if (!found.ok()) return found.status();
   RecordPage page = {.store_revision = found->revision, .more = found->more};
   for (const auto& [id, stored] : found->hulls) page.entries.push_back(Describe(id, stored));

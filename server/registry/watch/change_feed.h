@@ -1,12 +1,14 @@
 #ifndef HULLD_SERVER_REGISTRY_WATCH_CHANGE_FEED_H_
 #define HULLD_SERVER_REGISTRY_WATCH_CHANGE_FEED_H_
 
+#include <absl/container/flat_hash_map.h>
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <limits>
 #include <map>
@@ -24,7 +26,6 @@
 #include "server/registry/catalog/registry_types.h"
 #include "server/registry/memory/locked.h"
 #include "server/registry/memory/memory_budget.h"
-#include "server/registry/watch/deletion_log.h"
 #include "server/store/store.h"
 
 namespace hulld::server {
@@ -172,6 +173,51 @@ struct Incarnation {
   bool operator==(const Incarnation&) const = default;
 };
 
+// The most recent deletions of hulls and bodies, in the order of their revisions, for watches that
+// resume: a deletion leaves no trace in the store. Not thread-safe.
+class DeletionLog {
+ public:
+  // Maximum number of deletions: 25 MiB with IDs of maximum length, outside the memory budget.
+  static constexpr size_t kCapacity = 1 << 16;
+
+  struct Deletion {
+    uint64_t revision;
+    std::string id;
+    bool was_body;
+  };
+
+  // Starts an empty log at this revision.
+  void Begin(uint64_t revision) { begin_ = revision; }
+  // Adds a deletion. Requires a revision above that of the last deletion.
+  void Add(const std::string& id, uint64_t revision, bool was_body);
+  // Notes that a hull or body was created.
+  void NoteCreation(const std::string& id, bool is_body);
+
+  // Returns true if the log contains every deletion after this revision.
+  bool IsCompleteAfter(uint64_t revision) const { return revision >= begin_; }
+  // Returns the first deletion after this revision, or end().
+  std::deque<Deletion>::const_iterator After(uint64_t revision) const;
+  std::deque<Deletion>::const_iterator end() const { return log_.end(); }
+  // Returns true if the ID has been unused since this deletion, or since later ones that a watch of
+  // hulls does not report. bodies: bodies count, too. Requires a deletion in the log.
+  bool IsFinal(const Deletion& deletion, bool bodies) const;
+
+ private:
+  // The last deletion of an ID without a hull created since.
+  struct Last {
+    uint64_t revision;
+    // The last deletion of a hull since one was created; 0: none.
+    uint64_t hull_revision;
+    bool is_body_now = false;
+  };
+
+  std::deque<Deletion> log_;
+  // The log is complete after this revision.
+  uint64_t begin_ = 0;
+  // Keys are the IDs in `log_`.
+  std::unordered_map<std::string_view, Last> last_;
+};
+
 // Sends the initial state and then every change of hulls and bodies to watches. A watch first
 // catches up: it reports deletions, if it resumes, and lists the existing hulls. Then it reports
 // the changes noted since, and is synced whenever none is left.
@@ -206,13 +252,13 @@ class ChangeFeed {
   // all other functions.
   void Begin(uint64_t revision, PageSource& pages);
 
-  // Note a committed change at the revision of its record, or at `revision`. former: the
-  // incarnation that had the ID before, possibly the same one; nullopt: none. It is of the other
-  // kind if peer servers turned a hull into a body, or a body into a hull, by several changes.
-  // Cost: O(log n) per group that includes the ID, and one hash per length of a watched prefix.
-  void NoteHull(Locked& locked, const std::optional<Incarnation>& former, const HullPointer& hull);
-  void NoteBody(Locked& locked, const std::optional<Incarnation>& former,
-                const std::shared_ptr<const Body>& body);
+  // Note a committed change at the revision of its record, or at `revision`. body: null for a
+  // change of a hull. former: the incarnation that had the ID before, possibly the same one;
+  // nullopt: none. It is of the other kind if peer servers turned a hull into a body, or a body
+  // into a hull, by several changes. Cost: O(log n) per group that includes the ID, and one hash
+  // per length of a watched prefix.
+  void NotePresent(Locked& locked, const std::optional<Incarnation>& former,
+                   const HullPointer& hull, const std::shared_ptr<const Body>& body);
   void NoteDeleted(Locked& locked, const std::string& id, const Incarnation& former,
                    uint64_t revision);
   // Notes a revision whose change cannot be described; only the revision is reported.
@@ -239,12 +285,8 @@ class ChangeFeed {
   void EndAll();
 
  private:
-  struct Hash {
-    using is_transparent = void;
-    size_t operator()(std::string_view text) const { return std::hash<std::string_view>()(text); }
-  };
   using Groups = std::vector<std::shared_ptr<WatchGroup>>;
-  using GroupsByName = std::unordered_map<std::string, Groups, Hash, std::equal_to<>>;
+  using GroupsByName = absl::flat_hash_map<std::string, Groups>;
 
   // A change of the hull or body with an ID.
   struct Change {
@@ -264,14 +306,11 @@ class ChangeFeed {
 
   static std::optional<Change> AsReportedTo(const WatchTarget& target, const Change& change);
   void Note(Locked& locked, const std::string& id, const Change& change);
-  void NotePresent(Locked& locked, const std::string& id, const std::optional<Incarnation>& former,
-                   Change change);
   void NoteFor(Locked& locked, const std::shared_ptr<WatchGroup>& group, const std::string& id,
                const Change& change);
 
   std::shared_ptr<WatchGroup> GroupOf(const WatchTarget& target);
   void RemoveGroup(const std::shared_ptr<WatchGroup>& group);
-  void AddId(const std::string& id, const std::shared_ptr<WatchGroup>& group);
   void RemoveId(const std::string& id, const std::shared_ptr<WatchGroup>& group);
   void DropChanges(WatchGroup& group);
   void Charge(uint64_t before, uint64_t now);

@@ -108,7 +108,9 @@ void AddBase(const std::string& hull_id, const Change& change, Encoder& puts) {
   for (uint32_t part = 0; !rest.empty(); ++part) {
     const auto vertices = rest.first(std::min(rest.size(), kBasePartVertices));
     puts.Add("hulld_put_bases",
-             {Text(hull_id), Bigint(incarnation), Bigint(revision),
+             {Text(hull_id),
+              Bigint(incarnation),
+              Bigint(revision),
               {Element::kInteger, EncodeInteger(part)},
               Sealed(BaseKey(incarnation, revision, part), EncodeVertices(vertices))});
     rest = rest.subspan(vertices.size());

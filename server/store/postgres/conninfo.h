@@ -8,8 +8,9 @@
 
 namespace hulld::server {
 
-// Connection parameters of a database by keyword, for PQconnectdbParams. They may include passwords,
-// so no error or log line quotes the text; libpq's own errors name host, port, user and database.
+// Connection parameters of a database by keyword, for PQconnectdbParams. They may include
+// passwords, so no error or log line quotes the text; libpq's own errors name host, port, user and
+// database.
 using Conninfo = std::map<std::string, std::string>;
 
 // text: a connection string of libpq, keywords with values or a URI. Missing keywords get defaults

@@ -209,16 +209,9 @@ absl::StatusOr<std::unique_ptr<PostgresStore>> PostgresStore::Open(PostgresOptio
     return Prefixed(absl::StrCat(PostgresOptions::kSetting, ": "), conninfo.status());
   }
   std::unique_ptr<PostgresStore> store(new PostgresStore(std::move(options), *std::move(conninfo)));
-  absl::StatusOr<std::unique_ptr<Session>> session = store->OpenKeeper();
-  if (!session.ok()) return OpenFailed(session.status());
-  store->keeper_session_ = *std::move(session);
-  if (absl::Status s = store->CheckServer(*store->keeper_session_); !s.ok()) return OpenFailed(s);
-  if (absl::Status s = store->WaitForTurn(); !s.ok()) return OpenFailed(s);
-  Session& keeper = *store->keeper_session_;
+  if (absl::Status s = store->BecomeActive(); !s.ok()) return OpenFailed(s);
+  const Session& keeper = *store->keeper_session_;
   const bool shared = store->options_.shared;
-  const absl::Status made = shared ? store->MakeSharedSchema(keeper) : store->MakeSchema(keeper);
-  if (!made.ok()) return OpenFailed(made);
-  if (absl::Status s = store->BeginPatiently(); !s.ok()) return OpenFailed(s);
   spdlog::info(
       "store: {}, PostgreSQL {}; acknowledged changes are committed there{} (synchronous_commit = "
       "{}); {}epoch {}",
@@ -229,6 +222,15 @@ absl::StatusOr<std::unique_ptr<PostgresStore>> PostgresStore::Open(PostgresOptio
   if (shared && store->options_.notices) store->StartNotices();
   store->keeper_ = std::thread([raw = store.get()] { raw->Keep(); });
   return store;
+}
+
+absl::Status PostgresStore::BecomeActive() {
+  HULLD_ASSIGN_OR_RETURN(keeper_session_, OpenKeeper());
+  HULLD_RETURN_IF_ERROR(CheckServer(*keeper_session_));
+  HULLD_RETURN_IF_ERROR(WaitForTurn());
+  HULLD_RETURN_IF_ERROR(options_.shared ? MakeSharedSchema(*keeper_session_)
+                                        : MakeSchema(*keeper_session_));
+  return BeginPatiently();
 }
 
 // The connection has worked before, so a failure is treated as temporary: for example, the database

@@ -334,11 +334,10 @@ void PostgresStore::GiveNewId() {
 // The sync of this transaction covers earlier commits.
 absl::StatusOr<bool> PostgresStore::SharedOutcome(uint64_t batch) {
   HULLD_RETURN_IF_ERROR(RenewWriter());
-  const Statement statements[] = {
-      {.text = "BEGIN"},
-      {.name = "hulld_touch", .parameters = {EncodeBigint(epoch())}},
-      {.name = "hulld_server", .parameters = {owner_}},
-      {.text = "COMMIT"}};
+  const Statement statements[] = {{.text = "BEGIN"},
+                                  {.name = "hulld_touch", .parameters = {EncodeBigint(epoch())}},
+                                  {.name = "hulld_server", .parameters = {owner_}},
+                                  {.text = "COMMIT"}};
   HULLD_ASSIGN_OR_RETURN(const std::vector<Rows> rows, writer_->AskToCommit(statements));
   const Rows& last = rows[2];
   return last.count() == 1 && last.bigint(0, 0) == batch;

@@ -171,7 +171,8 @@ class PostgresStore : public Store, public PeerFeed {
   absl::StatusOr<std::unique_ptr<Session>> OpenKeeper() const;
   absl::StatusOr<std::unique_ptr<Session>> OpenListener() const;
 
-  // Steps of opening, in this order.
+  // Opens the store by the following steps, in this order.
+  absl::Status BecomeActive();
   absl::Status CheckServer(Session& session);
   absl::Status WaitForTurn();
   absl::Status MakeSchema(Session& session);

@@ -46,8 +46,9 @@ class TestRegistry {
     });
   }
   absl::StatusOr<uint64_t> Delete(const std::string& id) {
-    return Wait<uint64_t>(
-        [&](Reply<uint64_t> done) { registry_.changes().Delete("hull", id, std::nullopt, std::move(done)); });
+    return Wait<uint64_t>([&](Reply<uint64_t> done) {
+      registry_.changes().Delete("hull", id, std::nullopt, std::move(done));
+    });
   }
   absl::StatusOr<OpenResult> Open(const std::string& id, const std::string& writer = "w",
                                   bool create_if_absent = true) {
@@ -60,7 +61,7 @@ class TestRegistry {
                                      std::vector<Vector> points) {
     return Wait<ChunkResult>([&](Reply<ChunkResult> done) {
       registry_.changes().Append(session, {sequence, std::move(points), std::nullopt}, {}, {},
-                               std::move(done));
+                                 std::move(done));
     });
   }
   // Sends one chunk in its own session.

@@ -218,7 +218,7 @@ TEST(RegistryOfMemoryStore, RefusesToGrowBeyondTheLimit) {
     });
     return DurableRegistry::Wait<ChunkResult>([&](Reply<ChunkResult> done) {
       registry.changes().Append(opened->session, {1, SpherePoints(1000), std::nullopt}, {}, {},
-                              std::move(done));
+                                std::move(done));
     });
   };
   ASSERT_TRUE(put("first").ok());
@@ -257,7 +257,7 @@ TEST(RegistryOfMemoryStore, PointsThatWaitCount) {
   };
   const auto first = DurableRegistry::Wait<ChunkResult>([&](Reply<ChunkResult> done) {
     registry.changes().Append(opened->session, {1, line, std::nullopt}, should_stop, {},
-                            std::move(done));
+                              std::move(done));
   });
   EXPECT_TRUE(first.ok());
   EXPECT_TRUE(asked);
@@ -285,8 +285,8 @@ TEST(RegistryOfMemoryStore, PointsThatAreRefusedCountNoMore) {
   const auto append = [&](size_t points) {
     return DurableRegistry::Wait<ChunkResult>([&](Reply<ChunkResult> done) {
       registry.changes().Append(opened->session,
-                              {1, std::vector<Vector>(points, Vector(1, 2, 3)), {}}, {}, {},
-                              std::move(done));
+                                {1, std::vector<Vector>(points, Vector(1, 2, 3)), {}}, {}, {},
+                                std::move(done));
     });
   };
   EXPECT_EQ(append(1000).status().code(), absl::StatusCode::kResourceExhausted);

@@ -258,7 +258,8 @@ TEST_F(RegistryRecords, BodiesAreListedPageByPageWithoutBeingKept) {
   Start(1000);
   std::string after;
   for (int i = 0; i < 10; ++i) {
-    const absl::StatusOr<RecordPage> page = registry_.records().List("b", after, 5, {}, {.bodies = true});
+    const absl::StatusOr<RecordPage> page =
+        registry_.records().List("b", after, 5, {}, {.bodies = true});
     ASSERT_TRUE(page.ok()) << page.status();
     ASSERT_EQ(page->entries.size(), 5);
     EXPECT_TRUE(page->more);

@@ -42,7 +42,7 @@ class RegistryTest : public ::testing::Test {
                                      std::function<bool()> should_stop = {}) {
     return Wait<ChunkResult>([&](Reply<ChunkResult> done) {
       registry_.changes().Append(session, {sequence, std::move(points), std::nullopt},
-                               std::move(should_stop), {}, std::move(done));
+                                 std::move(should_stop), {}, std::move(done));
     });
   }
 
@@ -57,8 +57,9 @@ class RegistryTest : public ::testing::Test {
   AppendSession Open(const std::string& id) { return OpenAppend(id, "w")->session; }
 
   absl::StatusOr<uint64_t> Delete(const std::string& id) {
-    return Wait<uint64_t>(
-        [&](Reply<uint64_t> done) { registry_.changes().Delete("hull", id, std::nullopt, std::move(done)); });
+    return Wait<uint64_t>([&](Reply<uint64_t> done) {
+      registry_.changes().Delete("hull", id, std::nullopt, std::move(done));
+    });
   }
 
   CountingStore store_;
@@ -320,9 +321,9 @@ TEST_F(RegistryTest, ADeletionWaitsForTheChunkInProgressAndRefusesTheNext) {
   const auto result = Append(session, 1, std::move(points), [&] {
     if (!std::exchange(asked, true)) {
       registry_.changes().Delete("hull", "h", std::nullopt,
-                               [&](absl::StatusOr<uint64_t> reply) { deleted.set_value(reply); });
+                                 [&](absl::StatusOr<uint64_t> reply) { deleted.set_value(reply); });
       registry_.changes().Append(session, {2, {{0, 1, 0}}, std::nullopt}, {}, {},
-                               [&](absl::StatusOr<ChunkResult> reply) { next.set_value(reply); });
+                                 [&](absl::StatusOr<ChunkResult> reply) { next.set_value(reply); });
       EXPECT_EQ(registry_.records().List("", "", 10)->entries.size(), 1);
     }
     return false;
@@ -363,10 +364,10 @@ TEST_F(RegistryTest, ChunksOfOneSessionAreAnsweredInOrderThoughTheyOverlap) {
   std::promise<void> all;
   for (uint64_t i = 1; i <= kChunks; ++i) {
     registry_.changes().Append(session, {i, {{static_cast<double>(i), 0, 0}}, std::nullopt}, {}, {},
-                             [&](absl::StatusOr<ChunkResult> result) {
-                               revisions.push_back(result.ok() ? result->hull_revision : 0);
-                               if (revisions.size() == kChunks) all.set_value();
-                             });
+                               [&](absl::StatusOr<ChunkResult> result) {
+                                 revisions.push_back(result.ok() ? result->hull_revision : 0);
+                                 if (revisions.size() == kChunks) all.set_value();
+                               });
   }
   all.get_future().wait();
   for (uint64_t i = 0; i < kChunks; ++i) EXPECT_EQ(revisions[i], i + 2);

@@ -107,7 +107,8 @@ void Client::DeleteBody() {
   };
   Await<uint64_t>(
       [&](Reply<uint64_t> done) {
-        simulation_.registry.changes().Delete("body", HullName(call.hull), std::nullopt, std::move(done));
+        simulation_.registry.changes().Delete("body", HullName(call.hull), std::nullopt,
+                                              std::move(done));
       },
       check);
 }

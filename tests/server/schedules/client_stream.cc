@@ -74,8 +74,9 @@ bool Client::OpenStream(const std::shared_ptr<Stream>& stream, bool create_if_ab
   };
   Await<OpenResult>(
       [&](Reply<OpenResult> done) {
-        simulation_.registry.changes().OpenAppend(HullName(stream->hull), WriterName(stream->writer),
-                                                create_if_absent, on_gone, std::move(done));
+        simulation_.registry.changes().OpenAppend(HullName(stream->hull),
+                                                  WriterName(stream->writer), create_if_absent,
+                                                  on_gone, std::move(done));
       },
       check);
   return stream->is_open;

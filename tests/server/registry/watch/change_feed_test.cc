@@ -130,13 +130,13 @@ class ChangeFeedTest : public ::testing::Test {
   void PutBody(const std::string& id) {
     std::promise<absl::Status> done;
     registry().changes().PutBody({{id, 0, 0}, {"piece"}, {{0, Pose()}}}, std::nullopt,
-                            [&done](const auto& put) { done.set_value(put.status()); });
+                                 [&done](const auto& put) { done.set_value(put.status()); });
     ASSERT_TRUE(done.get_future().get().ok());
   }
   void DeleteBody(const std::string& id) {
     std::promise<absl::Status> done;
     registry().changes().Delete("body", id, std::nullopt,
-                               [&done](const auto& deleted) { done.set_value(deleted.status()); });
+                                [&done](const auto& deleted) { done.set_value(deleted.status()); });
     ASSERT_TRUE(done.get_future().get().ok());
   }
 
