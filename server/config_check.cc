@@ -15,7 +15,7 @@
 #include "server/contract/status_map.h"
 #include "server/process/listen_address.h"
 #include "server/process/metrics_endpoint.h"
-#include "server/store/postgres/conninfo.h"
+#include "server/store/postgres/session.h"
 
 namespace hulld::server {
 

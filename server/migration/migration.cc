@@ -60,17 +60,17 @@ Migration::Migration(Store& source, Progress progress)
 absl::StatusOr<Migration> Migration::Read(Store& source, Progress progress) {
   Migration migration(source, std::move(progress));
   absl::Status damage;
-  absl::Status read = source.ForEachHull([&](const std::string&, absl::StatusOr<StoredHull> hull) {
-    if (!hull.ok()) return damage.Update(hull.status());
-    migration.hulls_.push_back(*std::move(hull));
-  });
-  if (!read.ok()) return read;
-  read = source.ForEachBody([&](const std::string&, absl::StatusOr<StoredBody> body) {
-    if (!body.ok()) return damage.Update(body.status());
-    migration.bodies_.push_back(*std::move(body));
-  });
-  if (!read.ok()) return read;
-  if (!damage.ok()) return damage;
+  HULLD_RETURN_IF_ERROR(
+      source.ForEachHull([&](const std::string&, absl::StatusOr<StoredHull> hull) {
+        if (!hull.ok()) return damage.Update(hull.status());
+        migration.hulls_.push_back(*std::move(hull));
+      }));
+  HULLD_RETURN_IF_ERROR(
+      source.ForEachBody([&](const std::string&, absl::StatusOr<StoredBody> body) {
+        if (!body.ok()) return damage.Update(body.status());
+        migration.bodies_.push_back(*std::move(body));
+      }));
+  HULLD_RETURN_IF_ERROR(damage);
   return migration;
 }
 
@@ -88,9 +88,8 @@ absl::Status Migration::Prepare(MigrationTarget& target) {
   }
   uint64_t held = 0;
   const auto count = [&held](const auto&...) { ++held; };
-  absl::Status read = target.store().ForEachHull(count);
-  if (read.ok()) read = target.store().ForEachBody(count);
-  if (!read.ok()) return read;
+  HULLD_RETURN_IF_ERROR(target.store().ForEachHull(count));
+  HULLD_RETURN_IF_ERROR(target.store().ForEachBody(count));
   if (held == 0 && target.store().revision() == 0) return target.Begin(as_of_);
   return absl::FailedPreconditionError(absl::StrCat(
       "the destination is not empty: it is store ", target.store().id(), " at revision ",
@@ -180,12 +179,11 @@ absl::StatusOr<std::vector<Change>> Migration::ChangesOf(const StoredHull& hull)
 absl::Status Migration::Compare(Store& copy) const {
   HULLD_ASSIGN_OR_RETURN(const Migration read, Read(copy, progress_));
   uint64_t done = 0;
-  absl::Status status =
+  HULLD_RETURN_IF_ERROR(
       CompareAll(hulls_, read.hulls_, [&](const StoredHull& hull, const StoredHull& other) {
         progress_(++done, all());
         return CompareHull(copy, hull, other);
-      });
-  if (!status.ok()) return status;
+      }));
   return CompareAll(bodies_, read.bodies_, [&](const StoredBody& body, const StoredBody& other) {
     progress_(++done, all());
     return EncodeStoredBody(body) == EncodeStoredBody(other)

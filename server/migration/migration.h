@@ -8,6 +8,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <ostream>
 #include <span>
 #include <string>
 #include <vector>
@@ -96,6 +97,13 @@ class Migration {
   std::vector<StoredHull> hulls_;
   std::vector<StoredBody> bodies_;
 };
+
+// 'hulld migrate': copies a store that no server has open to another store, of the same kind or
+// another, and compares the two. arguments: the command line after "migrate". Prints progress and
+// results to `out`, and errors to `err`. Returns the exit status of the process: 0 if everything is
+// copied and equal, 1 if it failed midway and can be resumed, 2 if it was refused and changed
+// nothing.
+int RunMigrate(const std::vector<std::string>& arguments, std::ostream& out, std::ostream& err);
 
 }  // namespace hulld::server
 

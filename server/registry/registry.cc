@@ -7,6 +7,7 @@
 #include <mutex>
 #include <utility>
 
+#include "core/base/status_macros.h"
 #include "server/registry/catalog/registered_hull.h"
 #include "server/settings/resource_limits.h"
 
@@ -42,18 +43,17 @@ absl::Status Registry::Load() {
   if (state_.is_cache()) {
     state_.SetTotals(store.totals());
   } else {
-    absl::Status status =
+    HULLD_RETURN_IF_ERROR(
         store.ForEachHull([&](const std::string& id, const absl::StatusOr<StoredHull>& stored) {
           state_.AddStored(id, stored);
-        });
+        }));
     if (state_.statistics.damaged > 0) {
       spdlog::error("{} of {} hulls are damaged", state_.statistics.damaged, state_.hulls.size());
     }
-    if (!status.ok()) return status;
-    status = store.ForEachBody([&](const std::string& id, const absl::StatusOr<StoredBody>& body) {
-      state_.AddStoredBody(locked, id, body);
-    });
-    if (!status.ok()) return status;
+    HULLD_RETURN_IF_ERROR(
+        store.ForEachBody([&](const std::string& id, const absl::StatusOr<StoredBody>& body) {
+          state_.AddStoredBody(locked, id, body);
+        }));
   }
   return barrier_.Begin(locked, {&changes_, &records_});
 }

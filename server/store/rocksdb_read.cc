@@ -39,24 +39,6 @@ absl::StatusOr<std::optional<std::string>> RocksDbStore::Read(const std::string&
   return std::string(value);
 }
 
-// Bypasses the block cache, where the blocks of a scan would evict each other before reuse. The
-// result may pin parts of the database until it has been visited.
-void RocksDbStore::FindValues(std::span<const std::string> keys,
-                              const std::function<void(size_t, std::string_view)>& visit) {
-  const std::shared_lock lock(db_mutex_);
-  if (db_ == nullptr || keys.empty()) return;
-  const std::vector<rocksdb::Slice> slices(keys.begin(), keys.end());
-  std::vector<rocksdb::PinnableSlice> values(keys.size());
-  std::vector<rocksdb::Status> statuses(keys.size());
-  rocksdb::ReadOptions options;
-  options.fill_cache = false;
-  db_->MultiGet(options, db_->DefaultColumnFamily(), keys.size(), slices.data(), values.data(),
-                statuses.data());
-  for (size_t i = 0; i < keys.size(); ++i) {
-    if (statuses[i].ok()) visit(i, View(values[i]));
-  }
-}
-
 absl::StatusOr<std::optional<uint64_t>> RocksDbStore::ReadNumber(const std::string& key) {
   HULLD_ASSIGN_OR_RETURN(const std::optional<std::string> value, Read(key));
   if (!value.has_value()) return std::nullopt;
@@ -139,15 +121,27 @@ std::vector<absl::StatusOr<std::vector<Vector>>> RocksDbStore::LoadVerticesOfEac
   }
   std::vector<absl::StatusOr<std::vector<Vector>>> loaded(
       hulls.size(), absl::NotFoundError("the record has an unexpected number of values"));
-  FindValues(keys, [&](size_t at, std::string_view sealed) {
-    const StoredHull& hull = hulls[hull_of[at]];
-    const absl::StatusOr<std::string_view> value = Unseal(keys[at], sealed);
-    VertexAssembly assembly(hull);
-    absl::Status status = hull.layout.delta_count == 0
-                              ? assembly.AddBasePart(value)
-                              : assembly.AddDelta(hull.record.revision, value);
-    loaded[hull_of[at]] = std::move(assembly).Finish(std::move(status));
-  });
+  if (const std::shared_lock lock(db_mutex_); db_ != nullptr && !keys.empty()) {
+    const std::vector<rocksdb::Slice> slices(keys.begin(), keys.end());
+    // May pin parts of the database.
+    std::vector<rocksdb::PinnableSlice> values(keys.size());
+    std::vector<rocksdb::Status> statuses(keys.size());
+    // In the block cache, the blocks of a scan would evict each other before reuse.
+    rocksdb::ReadOptions options;
+    options.fill_cache = false;
+    db_->MultiGet(options, db_->DefaultColumnFamily(), keys.size(), slices.data(), values.data(),
+                  statuses.data());
+    for (size_t k = 0; k < keys.size(); ++k) {
+      if (!statuses[k].ok()) continue;
+      const StoredHull& hull = hulls[hull_of[k]];
+      const absl::StatusOr<std::string_view> value = Unseal(keys[k], View(values[k]));
+      VertexAssembly assembly(hull);
+      absl::Status status = hull.layout.delta_count == 0
+                                ? assembly.AddBasePart(value)
+                                : assembly.AddDelta(hull.record.revision, value);
+      loaded[hull_of[k]] = std::move(assembly).Finish(std::move(status));
+    }
+  }
   for (size_t i = 0; i < hulls.size(); ++i) {
     if (!loaded[i].ok()) loaded[i] = LoadVertices(hulls[i]);
   }

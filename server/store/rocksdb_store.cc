@@ -16,7 +16,6 @@
 
 #include "core/base/status_macros.h"
 #include "server/process/random_id.h"
-#include "server/store/data_directory.h"
 #include "server/store/store_errors.h"
 #include "server/store/store_keys.h"
 

@@ -16,7 +16,7 @@
 #include "server/registry/commit/committer.h"
 #include "server/registry/memory/locked.h"
 #include "server/registry/state/registry_state.h"
-#include "server/store/peer_feed.h"
+#include "server/store/store.h"
 
 namespace hulld::server {
 

@@ -169,7 +169,7 @@ void ChangeFeed::Note(Locked& locked, const std::string& id, const Change& chang
   revision_ = change.revision;
   if (change.kind != ChangeKind::kDeleted) deletions_.NoteCreation(id, change.is_body);
   const auto note_for = [&](const GroupsByName& groups, std::string_view name) {
-    const auto found = groups.find(name);
+    const auto found = groups.find(absl::string_view(name.data(), name.size()));
     if (found == groups.end()) return;
     for (const auto& group : found->second) {
       const std::optional<Change> reported = AsReportedTo(group->target, change);

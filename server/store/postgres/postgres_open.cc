@@ -89,7 +89,7 @@ constexpr char kTables[] = R"(
   ALTER TABLE hulld.deltas ALTER COLUMN vertices SET STORAGE EXTERNAL;)";
 
 // Settings of every session. The database aborts statements of a server that has disconnected, or
-// that stalls while it holds locks. The timeouts are a choice, as in conninfo.cc, and shorter than
+// that stalls while it holds locks. The timeouts are a choice, as in session.cc, and shorter than
 // PostgresOptions::answer_time. Every statement uses an index, even if its plan was made when the
 // table was small.
 constexpr char kSettings[] = R"(

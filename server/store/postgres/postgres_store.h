@@ -19,7 +19,6 @@
 #include <vector>
 
 #include "server/store/postgres/batch_notices.h"
-#include "server/store/postgres/conninfo.h"
 #include "server/store/postgres/session.h"
 #include "server/store/store.h"
 

@@ -9,6 +9,7 @@
 #include <condition_variable>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <span>
@@ -17,10 +18,20 @@
 #include <utility>
 #include <vector>
 
-#include "server/store/postgres/conninfo.h"
 #include "server/store/store_keys.h"
 
 namespace hulld::server {
+
+// Connection parameters of a database by keyword, for PQconnectdbParams. They may include
+// passwords, so no error or log line quotes the text; libpq's own errors name host, port, user and
+// database.
+using Conninfo = std::map<std::string, std::string>;
+
+// text: a connection string of libpq, keywords with values or a URI. Missing keywords get defaults
+// that bound the wait for an unreachable machine and select a writable server. INVALID_ARGUMENT,
+// without quoting the text: it is not a connection string, or a password in it ends early, so that
+// its rest would be parsed as a host or a database.
+absl::StatusOr<Conninfo> ParseConninfo(const std::string& text);
 
 // Encodes a bigint in PostgreSQL's binary format. Revisions and other numbers stay below 2^63.
 inline std::string EncodeBigint(uint64_t number) { return BigEndian(number); }

@@ -10,7 +10,6 @@
 #include <sstream>
 #include <tuple>
 
-#include "server/migration/migrate.h"
 #include "server/store/postgres/postgres_store.h"
 #include "server/store/rocksdb_store.h"
 #include "server/store/store_keys.h"

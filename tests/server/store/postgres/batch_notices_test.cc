@@ -10,7 +10,6 @@
 #include <memory>
 #include <semaphore>
 
-#include "server/store/postgres/conninfo.h"
 #include "server/store/postgres/session.h"
 #include "tests/server/harness/postgres/postgres_cluster.h"
 

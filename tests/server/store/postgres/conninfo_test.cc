@@ -1,7 +1,7 @@
-#include "server/store/postgres/conninfo.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include "server/store/postgres/session.h"
 
 namespace hulld::server {
 namespace conninfo_test {
