@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "core/base/status_macros.h"
+#include "server/store/store_keys.h"
 
 namespace hulld::server {
 namespace {

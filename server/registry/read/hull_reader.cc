@@ -202,18 +202,20 @@ void HullReader::NoteView(Locked& locked, const HullPointer& hull, KnownHulls& h
 // except hulls that another reader is loading. Releases the mutex. Points that cannot be read, or
 // that a writer superseded, stay missing.
 void HullReader::LoadMany(Locked& locked, const HullsRead& read) {
+  // A choice: many lookups, so that threads are seldom started.
+  constexpr size_t kMaxHulls = 4 * kMaxLookupsPerHold;
   KnownHulls& hulls = read.known;
   // At about 200 bytes per point, a twentieth of the memory limit: the readers' share is not
   // checked until each hull is looked up.
   const uint64_t max_points = std::min<uint64_t>(1 << 17, state_.limits.memory_limit / 4096);
-  if (locked.lookups() > 0) locked.Yield();
   std::vector<KnownHulls::Known*> chosen;
   std::vector<StoredHull> stored;
   uint64_t points = 0;
   // due_ is processed from the back.
-  for (size_t n = hulls.due_.size(); n > 0 && locked.lookups() + 1 < kMaxLookupsPerHold; --n) {
+  for (size_t n = 0; n < std::min(hulls.due_.size(), kMaxHulls); ++n) {
+    if (locked.lookups() >= kMaxLookupsPerHold) locked.Yield();
     locked.NoteLookup();
-    KnownHulls::Known& known = hulls.hulls_[hulls.due_[n - 1]];
+    KnownHulls::Known& known = hulls.hulls_[hulls.due_[hulls.due_.size() - 1 - n]];
     const std::string& id = read.ids[known.first];
     const HullPointer hull = state_.IsKnown(id) ? state_.FindVisible(id) : nullptr;
     if (hull == nullptr || hull->state.damaged() || hull->IsReady() || hull->is_loading() ||
@@ -223,16 +225,20 @@ void HullReader::LoadMany(Locked& locked, const HullsRead& read) {
     const VertexLayout& layout = hull->committed().layout;
     points += layout.base_vertices + layout.delta_vertices;
     if (points > max_points) break;
+    hull->StartLoading();
     known.found = hull;
     chosen.push_back(&known);
     stored.push_back(hull->committed());
   }
+  // LoadOne reports the error of a single hull.
+  if (chosen.size() == 1) chosen.front()->found->EndLoading();
   if (chosen.size() < 2) return;
-  for (const KnownHulls::Known* known : chosen) known->found->StartLoading();
   locked.Unlock();
   std::vector<LoadedHull> loaded = LoadEach(state_.store, stored, loaders_, read.should_stop);
   locked.Lock();
   for (size_t i = 0; i < chosen.size(); ++i) {
+    if (locked.lookups() >= kMaxLookupsPerHold) locked.Yield();
+    locked.NoteLookup();
     RegisteredHull& hull = *chosen[i]->found;
     hull.EndLoading();
     const bool is_current = hull.committed().record.revision == stored[i].record.revision;

@@ -118,9 +118,9 @@ TEST_F(RegistryInterleaving, ManyHullsAreReadByManyThreads) {
   EXPECT_LE(registry_.Holds().max_lookups, kMaxLookupsPerHold);
 }
 
-// The next hulls are read while the first are looked up. Hulls deleted in the interim are not
-// found, and a reader that waits for one is not delayed by a cancelled reader.
-TEST_F(RegistryInterleaving, HullsThatAreReadAheadMayGoOrBeWaitedFor) {
+// Hulls that are deleted while many are read are not found, and a reader that waits for one is not
+// delayed by a cancelled reader.
+TEST_F(RegistryInterleaving, HullsThatAreReadTogetherMayGoOrBeWaitedFor) {
   constexpr int kHulls = 300;
   std::vector<std::string> ids;
   for (int i = 0; i < kHulls; ++i) {
