@@ -15,7 +15,7 @@
 #include "server/contract/status_map.h"
 #include "server/process/listen_address.h"
 #include "server/process/metrics_endpoint.h"
-#include "server/store/postgres/conninfo.h"
+#include "server/store/postgres/session.h"
 
 namespace hulld::server {
 
@@ -74,7 +74,7 @@ absl::Status CheckDataDir(const std::string& path) {
 
 absl::Status CheckConninfoFile(const std::string& path, const char* setting) {
   HULLD_ASSIGN_OR_RETURN(const std::string text, ReadSecretFile(path, setting));
-  return Prefixed(absl::StrCat(setting, " ", path, ": "), Conninfo::Parse(text).status());
+  return Prefixed(absl::StrCat(setting, " ", path, ": "), ParseConninfo(text).status());
 }
 
 std::vector<std::string> ExposureWarnings(const Config& config) {

@@ -13,7 +13,7 @@
 
 #include "server/admin/doctor.h"
 #include "server/config_check.h"
-#include "server/migration/migrate.h"
+#include "server/migration/migration.h"
 #include "server/process/descriptors.h"
 #include "server/process/heap.h"
 #include "server/process/log.h"

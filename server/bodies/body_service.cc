@@ -117,8 +117,7 @@ UnaryReactor* BodyService::ListBodies(CallContext* context, const Bytes* request
 UnaryReactor* BodyService::DeleteBody(CallContext* context, const Bytes* request, Bytes* response) {
   return DeleteCall::Start(context, parts_.admission, Rpc::kDeleteBody, request, response,
                            [this](DeleteCall* call) {
-                             EndDeleted(parts_.registry, call, parts_.registry.bodies(), "body",
-                                        call->request().body_id());
+                             EndDeleted(parts_.registry, call, "body", call->request().body_id());
                            });
 }
 
@@ -127,7 +126,7 @@ void BodyService::Put(PutCall* call) {
   absl::StatusOr<StoredBody> body = DecodeBody(call->request(), call->call().caller(),
                                                parts_.registry.limits().max_pieces_per_body);
   if (!body.ok()) return call->End(body.status());
-  parts_.registry.bodies().Put(
+  parts_.registry.changes().PutBody(
       *std::move(body), IfRevision(call->request()),
       [this, call](const absl::StatusOr<PutBodyResult>& result) {
         if (!result.ok()) return call->End(result.status());
@@ -151,8 +150,8 @@ absl::Status BodyService::Get(const v1::GetBodyRequest& request, const Call& cal
                               std::chrono::nanoseconds staleness, v1::GetBodyResponse* response) {
   const std::string& id = request.body_id();
   HULLD_RETURN_IF_ERROR(CheckHullId(call.caller(), id, "body_id"));
-  const FoundBodies found =
-      parts_.registry.bodies().Find(std::span(&id, 1), [&call] { return call.ShouldStop(); });
+  const FoundBodies found = parts_.registry.records().FindBodies(
+      std::span(&id, 1), [&call] { return call.ShouldStop(); });
   if (!found.status.ok()) return found.status;
   const std::shared_ptr<const Body>& body = found.bodies.front();
   if (body == nullptr) return BodyNotFound(id);

@@ -39,7 +39,7 @@ void AppendStream::OnDone() {
   Locked([this] {
     if (!session_.has_value()) return;
     LogApplied();
-    parts_.registry.hulls().CloseAppend(*session_);
+    parts_.registry.changes().CloseAppend(*session_);
   });
 }
 
@@ -81,7 +81,7 @@ absl::Status AppendStream::HandleOpen(const v1::AppendOpen& open) {
     self.Locked([&] { self.Fail(reason); });
   };
   hull_id_ = open.hull_id();
-  parts_.registry.hulls().OpenAppend(
+  parts_.registry.changes().OpenAppend(
       open.hull_id(), writer_id_, open.create_if_absent(), on_gone,
       [this, self = shared_from_this()](const absl::StatusOr<OpenResult>& opened) {
         Locked([&] {
@@ -123,7 +123,7 @@ absl::Status AppendStream::HandleChunk(const v1::AppendChunk& message) {
   const uint64_t sequence = chunk.sequence;
   const uint64_t number = results_.Number();
   const auto arrival = std::chrono::steady_clock::now();
-  parts_.registry.hulls().Append(
+  parts_.registry.changes().Append(
       *session_, std::move(chunk), [this, self] { return call().ShouldStop(); },
       [this, self] { Locked([this] { --unbuilt_; }); },
       [this, self, sequence, number, arrival](const absl::StatusOr<ChunkResult>& result) {

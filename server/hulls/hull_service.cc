@@ -72,8 +72,7 @@ UnaryReactor* HullService::ListHulls(CallContext* context, const Bytes* request,
 UnaryReactor* HullService::DeleteHull(CallContext* context, const Bytes* request, Bytes* response) {
   return DeleteCall::Start(context, parts_.admission, Rpc::kDeleteHull, request, response,
                            [this](DeleteCall* call) {
-                             EndDeleted(parts_.registry, call, parts_.registry.hulls(), "hull",
-                                        call->request().hull_id());
+                             EndDeleted(parts_.registry, call, "hull", call->request().hull_id());
                            });
 }
 
@@ -86,7 +85,7 @@ void HullService::Create(CreateCall* call) {
   if (absl::Status s = CheckHullId(call->call().caller(), request.hull_id(), "hull_id"); !s.ok()) {
     return call->End(s);
   }
-  parts_.registry.hulls().Create(
+  parts_.registry.changes().Create(
       request.hull_id(), request.if_absent(),
       [this, call](const absl::StatusOr<PutHullResult>& created) {
         if (!created.ok()) return call->End(created.status());

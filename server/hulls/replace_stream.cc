@@ -108,7 +108,7 @@ void ReplaceStream::Commit() {
     *response_ = SerializeReply(response);
     FinishCall(absl::OkStatus());
   };
-  parts_.registry.hulls().Replace(std::move(replacement_), done);
+  parts_.registry.changes().Replace(std::move(replacement_), done);
 }
 
 }  // namespace hulld::server

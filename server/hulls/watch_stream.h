@@ -12,7 +12,7 @@
 #include "hulld/v1/hull.pb.h"
 #include "server/call/pulled_stream.h"
 #include "server/call/service_parts.h"
-#include "server/registry/watch/change_watch.h"
+#include "server/registry/watch/change_feed.h"
 
 namespace hulld::server {
 

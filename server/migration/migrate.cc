@@ -1,5 +1,3 @@
-#include "server/migration/migrate.h"
-
 #include <absl/strings/str_cat.h>
 
 #include <CLI/CLI.hpp>

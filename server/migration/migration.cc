@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "core/base/status_macros.h"
+#include "server/store/store_keys.h"
 
 namespace hulld::server {
 namespace {
@@ -16,35 +17,6 @@ namespace {
 // Limits of a transaction: vertices (24 MB), or changes of hulls and bodies. A choice.
 constexpr size_t kMaxVertices = 1'000'000;
 constexpr size_t kMaxChanges = 1000;
-
-// Changes sent to the target together.
-class Batch {
- public:
-  explicit Batch(MigrationTarget& target) : target_(target) {}
-
-  // Adds all changes of a hull, or of a body.
-  absl::Status Add(std::vector<Change> changes) {
-    for (Change& change : changes) {
-      vertices_ += change.vertices.size();
-      changes_.push_back(std::move(change));
-    }
-    return vertices_ >= kMaxVertices || changes_.size() >= kMaxChanges ? Flush() : absl::OkStatus();
-  }
-  absl::Status Flush() {
-    if (changes_.empty()) return absl::OkStatus();
-    std::vector<const Change*> pointers;
-    for (const Change& change : changes_) pointers.push_back(&change);
-    absl::Status status = target_.Add(pointers);
-    changes_.clear();
-    vertices_ = 0;
-    return status;
-  }
-
- private:
-  MigrationTarget& target_;
-  std::vector<Change> changes_;
-  size_t vertices_ = 0;
-};
 
 absl::Status Differs(const std::string& id, const std::string& what) {
   return absl::DataLossError(absl::StrCat("\"", id, "\" differs in the copy: ", what));
@@ -73,22 +45,6 @@ bool HasSameBits(const Vector& a, const Vector& b) {
   });
 }
 
-// Greatest IDs of a store's hulls and bodies; the copied ones are contiguous up to these.
-struct LastCopied {
-  std::string hull_id;
-  std::string body_id;
-};
-
-absl::StatusOr<LastCopied> FindLastCopied(Store& store) {
-  LastCopied last;
-  absl::Status status =
-      store.ForEachHull([&](const std::string& id, const auto&) { last.hull_id = id; });
-  if (!status.ok()) return status;
-  status = store.ForEachBody([&](const std::string& id, const auto&) { last.body_id = id; });
-  if (!status.ok()) return status;
-  return last;
-}
-
 absl::StatusOr<std::vector<WriterSequence>> ReadWriters(Store& store, const StoredHull& hull) {
   absl::StatusOr<std::vector<WriterSequence>> writers = store.LoadWriters(hull);
   if (!writers.ok() || writers->size() == hull.writer_count) return writers;
@@ -105,17 +61,17 @@ Migration::Migration(Store& source, Progress progress)
 absl::StatusOr<Migration> Migration::Read(Store& source, Progress progress) {
   Migration migration(source, std::move(progress));
   absl::Status damage;
-  absl::Status read = source.ForEachHull([&](const std::string&, absl::StatusOr<StoredHull> hull) {
-    if (!hull.ok()) return damage.Update(hull.status());
-    migration.hulls_.push_back(*std::move(hull));
-  });
-  if (!read.ok()) return read;
-  read = source.ForEachBody([&](const std::string&, absl::StatusOr<StoredBody> body) {
-    if (!body.ok()) return damage.Update(body.status());
-    migration.bodies_.push_back(*std::move(body));
-  });
-  if (!read.ok()) return read;
-  if (!damage.ok()) return damage;
+  HULLD_RETURN_IF_ERROR(
+      source.ForEachHull([&](const std::string&, absl::StatusOr<StoredHull> hull) {
+        if (!hull.ok()) return damage.Update(hull.status());
+        migration.hulls_.push_back(*std::move(hull));
+      }));
+  HULLD_RETURN_IF_ERROR(
+      source.ForEachBody([&](const std::string&, absl::StatusOr<StoredBody> body) {
+        if (!body.ok()) return damage.Update(body.status());
+        migration.bodies_.push_back(*std::move(body));
+      }));
+  HULLD_RETURN_IF_ERROR(damage);
   return migration;
 }
 
@@ -133,9 +89,8 @@ absl::Status Migration::Prepare(MigrationTarget& target) {
   }
   uint64_t held = 0;
   const auto count = [&held](const auto&...) { ++held; };
-  absl::Status read = target.store().ForEachHull(count);
-  if (read.ok()) read = target.store().ForEachBody(count);
-  if (!read.ok()) return read;
+  HULLD_RETURN_IF_ERROR(target.store().ForEachHull(count));
+  HULLD_RETURN_IF_ERROR(target.store().ForEachBody(count));
   if (held == 0 && target.store().revision() == 0) return target.Begin(as_of_);
   return absl::FailedPreconditionError(absl::StrCat(
       "the destination is not empty: it is store ", target.store().id(), " at revision ",
@@ -143,10 +98,25 @@ absl::Status Migration::Prepare(MigrationTarget& target) {
 }
 
 absl::StatusOr<MigrationCounts> Migration::CopyTo(MigrationTarget& target) {
-  MigrationCounts counts;
   HULLD_RETURN_IF_ERROR(Prepare(target));
-  HULLD_ASSIGN_OR_RETURN(const LastCopied last, FindLastCopied(target.store()));
-  Batch batch(target);
+  // Greatest IDs in the target: its hulls and bodies are contiguous up to these.
+  std::string last_hull;
+  std::string last_body;
+  HULLD_RETURN_IF_ERROR(
+      target.store().ForEachHull([&](const std::string& id, const auto&) { last_hull = id; }));
+  HULLD_RETURN_IF_ERROR(
+      target.store().ForEachBody([&](const std::string& id, const auto&) { last_body = id; }));
+  MigrationCounts counts;
+  std::vector<Change> pending;
+  size_t vertices = 0;
+  const auto flush = [&] {
+    std::vector<const Change*> changes;
+    for (const Change& change : pending) changes.push_back(&change);
+    absl::Status status = changes.empty() ? absl::OkStatus() : target.Add(changes);
+    pending.clear();
+    vertices = 0;
+    return status;
+  };
   const auto copy = [&](const auto& records, const std::string& last_id,
                         uint64_t* count) -> absl::Status {
     for (const auto& each : records) {
@@ -156,13 +126,19 @@ absl::StatusOr<MigrationCounts> Migration::CopyTo(MigrationTarget& target) {
         continue;
       }
       HULLD_ASSIGN_OR_RETURN(std::vector<Change> changes, ChangesOf(each));
-      HULLD_RETURN_IF_ERROR(batch.Add(std::move(changes)));
+      for (Change& change : changes) {
+        vertices += change.vertices.size();
+        pending.push_back(std::move(change));
+      }
+      if (vertices >= kMaxVertices || pending.size() >= kMaxChanges) {
+        HULLD_RETURN_IF_ERROR(flush());
+      }
       progress_(counts.hulls + counts.bodies, all());
     }
-    return batch.Flush();
+    return flush();
   };
-  HULLD_RETURN_IF_ERROR(copy(hulls_, last.hull_id, &counts.hulls));
-  HULLD_RETURN_IF_ERROR(copy(bodies_, last.body_id, &counts.bodies));
+  HULLD_RETURN_IF_ERROR(copy(hulls_, last_hull, &counts.hulls));
+  HULLD_RETURN_IF_ERROR(copy(bodies_, last_body, &counts.bodies));
   return counts;
 }
 
@@ -204,12 +180,11 @@ absl::StatusOr<std::vector<Change>> Migration::ChangesOf(const StoredHull& hull)
 absl::Status Migration::Compare(Store& copy) const {
   HULLD_ASSIGN_OR_RETURN(const Migration read, Read(copy, progress_));
   uint64_t done = 0;
-  absl::Status status =
+  HULLD_RETURN_IF_ERROR(
       CompareAll(hulls_, read.hulls_, [&](const StoredHull& hull, const StoredHull& other) {
         progress_(++done, all());
         return CompareHull(copy, hull, other);
-      });
-  if (!status.ok()) return status;
+      }));
   return CompareAll(bodies_, read.bodies_, [&](const StoredBody& body, const StoredBody& other) {
     progress_(++done, all());
     return EncodeStoredBody(body) == EncodeStoredBody(other)

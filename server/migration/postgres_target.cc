@@ -1,49 +1,32 @@
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
-#include <chrono>
 #include <iterator>
 #include <utility>
 #include <vector>
 
 #include "core/base/status_macros.h"
-#include "server/migration/migration_target.h"
+#include "server/migration/migration.h"
 #include "server/store/postgres/batch_statements.h"
-#include "server/store/postgres/conninfo.h"
-#include "server/store/postgres/parameters.h"
 #include "server/store/postgres/postgres_store.h"
 #include "server/store/postgres/session.h"
 
 namespace hulld::server {
 namespace {
 
-// Maximum silence of the database while an answer is due.
-constexpr std::chrono::milliseconds kAnswerTime{30'000};
-
-// Commits are on disk, regardless of the role's default. For the fence see postgres_store.h.
-// Requires that the store's row exists.
-constexpr char kPrepare[] = R"(
-    SET search_path = '';
-    SET synchronous_commit = on;
-    PREPARE migrate_fence(bigint, bigint, bigint, bigint) AS
-      UPDATE hulld.store SET written_in = $1, hulls = hulls + $2, vertices = vertices + $3,
-        bodies = bodies + $4;
-    PREPARE migrate_finish(bigint) AS UPDATE hulld.store SET revision = $1;)";
-
-// The store holds the claim and serves reads; a separate session writes, fenced by the epoch of
-// that claim.
+// Writes through the session of the store's commits, fenced by the epoch of its claim.
 class PostgresTarget : public MigrationTarget {
  public:
-  PostgresTarget(std::unique_ptr<PostgresStore> store, std::unique_ptr<Session> session)
-      : store_(std::move(store)), session_(std::move(session)) {}
+  explicit PostgresTarget(std::unique_ptr<PostgresStore> store) : store_(std::move(store)) {}
 
   Store& store() override { return *store_; }
 
   absl::StatusOr<std::optional<MigrationSource>> ReadMark() override {
-    HULLD_ASSIGN_OR_RETURN(const bool is_marked, HasTable(*session_, "hulld.migration"));
+    HULLD_ASSIGN_OR_RETURN(const bool is_marked, HasTable(store_->writer(), "hulld.migration"));
     if (!is_marked) return std::nullopt;
     HULLD_ASSIGN_OR_RETURN(
-        const Rows rows, session_->Ask({.text = "SELECT store_id, revision FROM hulld.migration"}));
+        const Rows rows,
+        store_->writer().Ask({.text = "SELECT store_id, revision FROM hulld.migration"}));
     if (rows.count() != 1) return absl::DataLossError("the row of hulld.migration is missing");
     return MigrationSource{std::string(rows.at(0, 0)), rows.bigint(0, 1)};
   }
@@ -62,31 +45,25 @@ class PostgresTarget : public MigrationTarget {
     statements.push_back(
         {.name = "migrate_begin", .parameters = {source.store_id, EncodeBigint(source.revision)}});
     statements.push_back({.text = "DEALLOCATE migrate_begin"});
-    return Transact(std::move(statements), {});
+    return Transact(std::move(statements), store_->revision(), {});
   }
 
   absl::Status Add(std::span<const Change* const> changes) override {
-    return Transact(StatementsOf(changes), AddedBy(changes));
+    return Transact(StatementsOf(changes), store_->revision(), AddedBy(changes));
   }
 
   absl::Status Finish(const MigrationSource& source) override {
-    std::vector<Statement> statements(2);
-    statements[0] = {.name = "migrate_finish", .parameters = {EncodeBigint(source.revision)}};
-    statements[1] = {.text = "DROP TABLE hulld.migration"};
-    return Transact(std::move(statements), {});
+    return Transact({{.text = "DROP TABLE hulld.migration"}}, source.revision, {});
   }
 
  private:
-  // added: change of the store's totals.
-  absl::Status Transact(std::vector<Statement> statements, const StoreTotals& added) {
-    std::vector<Statement> all(2);
-    all[0] = {.text = "BEGIN"};
-    all[1] = {.name = "migrate_fence",
-              .parameters = {EncodeBigint(store_->epoch()), EncodeBigint(added.hulls),
-                             EncodeBigint(added.vertices), EncodeBigint(added.bodies)}};
+  // revision: of the store after the transaction. added: change of its totals.
+  absl::Status Transact(std::vector<Statement> statements, uint64_t revision,
+                        const StoreTotals& added) {
+    std::vector<Statement> all = {{.text = "BEGIN"}, store_->Fence(revision, added)};
     std::ranges::move(statements, std::back_inserter(all));
     all.push_back({.text = "COMMIT"});
-    absl::Status status = session_->Ask(all).status();
+    absl::Status status = store_->writer().AskToCommit(all).status();
     if (status.ok()) return status;
     if (ViolatedConstraint(status) == "store_fence") {
       return absl::AbortedError(
@@ -95,24 +72,19 @@ class PostgresTarget : public MigrationTarget {
     return absl::Status(status.code(), absl::StrCat("the database: ", status.message()));
   }
 
-  // Declared before the session, which must end without waiting for the claim's end.
   const std::unique_ptr<PostgresStore> store_;
-  const std::unique_ptr<Session> session_;
 };
 
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<MigrationTarget>> OpenPostgresTarget(const std::string& conninfo) {
-  HULLD_ASSIGN_OR_RETURN(const Conninfo parsed, Conninfo::Parse(conninfo));
   PostgresOptions options;
   options.conninfo = conninfo;
   options.migrating = true;
   options.should_stop = [] { return true; };
   HULLD_ASSIGN_OR_RETURN(std::unique_ptr<PostgresStore> store,
                          PostgresStore::Open(std::move(options)));
-  HULLD_ASSIGN_OR_RETURN(std::unique_ptr<Session> session, Session::Open(parsed, kAnswerTime));
-  HULLD_RETURN_IF_ERROR(session->Run(absl::StrCat(kPrepare, PrepareBatchStatements())).status());
-  return std::make_unique<PostgresTarget>(std::move(store), std::move(session));
+  return std::make_unique<PostgresTarget>(std::move(store));
 }
 
 }  // namespace hulld::server

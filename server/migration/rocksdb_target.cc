@@ -3,8 +3,7 @@
 #include <utility>
 
 #include "core/base/status_macros.h"
-#include "server/migration/migration_target.h"
-#include "server/store/change_encoding.h"
+#include "server/migration/migration.h"
 #include "server/store/rocksdb_store.h"
 #include "server/store/store_keys.h"
 

@@ -4,11 +4,17 @@
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
+#include <memory>
 #include <utility>
 
+#include "core/base/check.h"
 #include "core/base/status_macros.h"
+#include "core/hull/growth/hull_builder.h"
 #include "server/contract/error_info.h"
 #include "server/contract/status_map.h"
+#include "server/contract/stopped_call.h"
+#include "server/registry/memory/memory_budget.h"
+#include "server/registry/memory/served_hull.h"
 
 namespace hulld::server {
 namespace {
@@ -97,12 +103,12 @@ ReadPlan PlanOf(const PlacedLookup& lookup) {
 }
 
 // Returns the bodies among the IDs; empty if there are none. Omits IDs that cannot be read now: the
-// subsequent hull lookup reports their errors. Otherwise as BodyRegistry::Find. WouldWait also if
-// there are bodies, whose boxes must be built.
+// subsequent hull lookup reports their errors. Otherwise as RecordReader::FindBodies. WouldWait
+// also if there are bodies, whose boxes must be built.
 absl::StatusOr<Bodies> BodiesAmong(Registry& registry, std::span<const std::string> ids,
                                    const std::function<bool()>& should_stop, bool may_wait) {
   if (!registry.has_bodies()) return Bodies();
-  FoundBodies found = registry.bodies().Find(ids, should_stop, may_wait);
+  FoundBodies found = registry.records().FindBodies(ids, should_stop, may_wait);
   if (!found.status.ok() && !absl::IsUnavailable(found.status)) return found.status;
   if (std::ranges::all_of(found.bodies, [](const auto& body) { return body == nullptr; })) {
     return Bodies();
@@ -118,7 +124,50 @@ bool IsSameBody(const std::shared_ptr<const Body>& a, const std::shared_ptr<cons
          a->damage().code() == b->damage().code();
 }
 
+// Bytes built between two checks of --memory-limit. A call that needs less is always answered.
+constexpr size_t kUncheckedBytes = 256 << 10;
+
+// The hull of a shape, and its charge.
+struct InlineHull {
+  ServedHull served;
+  MemoryCharge charge;
+};
+
+std::shared_ptr<const InlineHull> BuildInlineHull(std::span<const Vector> points,
+                                                  MemoryBudget& memory) {
+  HullBuilder builder;
+  HULLD_CHECK(builder.Add(points).ok());
+  const auto canonical = std::make_shared<CanonicalHull>(builder.Snapshot());
+  const std::shared_ptr<const QueryHull> version(canonical, &canonical->query_hull());
+  Box box = {points.front(), points.front()};
+  for (const Vector& vertex : canonical->hull()->vertices()) {
+    box = {box.low.cwiseMin(vertex), box.high.cwiseMax(vertex)};
+  }
+  const size_t bytes = sizeof(InlineHull) + sizeof(CanonicalHull) + canonical->MemoryBytes();
+  return std::make_shared<const InlineHull>(InlineHull{
+      ServedHull(version, box, canonical), MemoryCharge(memory, MemoryUse::kReading, bytes)});
+}
+
 }  // namespace
+
+absl::StatusOr<std::vector<HullView>> BuildInlineShapes(Registry& registry,
+                                                        const InlineShapes& shapes,
+                                                        const std::function<bool()>& should_stop) {
+  std::vector<HullView> views;
+  views.reserve(shapes.size());
+  size_t unchecked_bytes = 0;
+  for (size_t k = 0; k < shapes.size(); ++k) {
+    if (Stopped(should_stop)) return Cancelled();
+    if (unchecked_bytes > kUncheckedBytes) {
+      HULLD_RETURN_IF_ERROR(registry.CheckMemory(MemoryUse::kReading));
+      unchecked_bytes = 0;
+    }
+    const auto hull = BuildInlineHull(shapes.PointsOf(k), registry.memory());
+    unchecked_bytes += hull->charge.bytes();
+    views.push_back({{}, std::shared_ptr<const ServedHull>(hull, &hull->served)});
+  }
+  return views;
+}
 
 bool KnownPlaced::AreBodies(const Bodies& bodies) const {
   return std::ranges::equal(bodies, bodies_, IsSameBody);
@@ -193,8 +242,7 @@ absl::StatusOr<Resolved> RefreshPlaced(Registry& registry, std::span<const std::
   } while (!bodies.ok() || !known.AreBodies(*bodies));
   // The resolved snapshots are immutable, so building may take long.
   if (lookup.canonical) {
-    absl::Status s = MakeCanonical(registry, should_stop, may_wait, hulls->hulls);
-    if (!s.ok()) return s;
+    HULLD_RETURN_IF_ERROR(MakeCanonical(registry, should_stop, may_wait, hulls->hulls));
   }
   const auto add_shapes = [&known](std::vector<absl::StatusOr<HullView>>& to) {
     to.insert(to.end(), known.shapes_.begin(), known.shapes_.end());

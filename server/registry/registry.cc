@@ -4,10 +4,10 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <memory>
 #include <mutex>
 #include <utility>
 
+#include "core/base/status_macros.h"
 #include "server/registry/catalog/registered_hull.h"
 #include "server/settings/resource_limits.h"
 
@@ -18,16 +18,13 @@ Registry::Registry(Store& store, const Limits& limits, TaskPool& writers,
     : state_(store, limits, preparers),
       committer_(store, state_.mutex),
       loaders_(std::in_place, std::max(1, DefaultThreads() - 1), loaders),
-      barrier_(store.peers() == nullptr
-                   ? std::make_unique<ReadBarrier>(state_, committer_)
-                   : std::make_unique<PeerSync>(state_, committer_, *store.peers())),
-      records_(state_, committer_, *barrier_, *loaders_),
-      reader_(state_, *barrier_, records_, *loaders_),
-      bodies_(state_, committer_, *barrier_, records_),
-      changes_(state_, committer_, *barrier_, records_, writers) {}
+      barrier_(state_, committer_),
+      records_(state_, committer_, barrier_, *loaders_),
+      reader_(state_, barrier_, records_, *loaders_),
+      changes_(state_, committer_, barrier_, records_, writers) {}
 
 Registry::~Registry() {
-  barrier_->End();
+  barrier_.End();
   state_.EndPreparing();
   // Its thread applies peer changes to the parts that are destroyed below.
   committer_.End();
@@ -46,20 +43,19 @@ absl::Status Registry::Load() {
   if (state_.is_cache()) {
     state_.SetTotals(store.totals());
   } else {
-    absl::Status status =
+    HULLD_RETURN_IF_ERROR(
         store.ForEachHull([&](const std::string& id, const absl::StatusOr<StoredHull>& stored) {
           state_.AddStored(id, stored);
-        });
+        }));
     if (state_.statistics.damaged > 0) {
       spdlog::error("{} of {} hulls are damaged", state_.statistics.damaged, state_.hulls.size());
     }
-    if (!status.ok()) return status;
-    status = store.ForEachBody([&](const std::string& id, const absl::StatusOr<StoredBody>& body) {
-      state_.AddStoredBody(locked, id, body);
-    });
-    if (!status.ok()) return status;
+    HULLD_RETURN_IF_ERROR(
+        store.ForEachBody([&](const std::string& id, const absl::StatusOr<StoredBody>& body) {
+          state_.AddStoredBody(locked, id, body);
+        }));
   }
-  return barrier_->Begin(locked, {&changes_, &records_});
+  return barrier_.Begin(locked, {&changes_, &records_});
 }
 
 absl::StatusOr<Resolved> Registry::Resolve(std::span<const std::string> ids,

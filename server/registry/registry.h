@@ -5,7 +5,6 @@
 
 #include <cstddef>
 #include <functional>
-#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -13,14 +12,12 @@
 
 #include "server/process/metrics.h"
 #include "server/process/task_pool.h"
-#include "server/registry/bodies/body_registry.h"
 #include "server/registry/catalog/known_hulls.h"
 #include "server/registry/catalog/registry_types.h"
-#include "server/registry/changes/hull_changes.h"
+#include "server/registry/changes/local_changes.h"
 #include "server/registry/commit/committer.h"
 #include "server/registry/memory/locked.h"
 #include "server/registry/memory/memory_budget.h"
-#include "server/registry/peers/peer_sync.h"
 #include "server/registry/peers/read_barrier.h"
 #include "server/registry/read/hull_reader.h"
 #include "server/registry/records/record_reader.h"
@@ -37,11 +34,10 @@ namespace hulld::server {
 //   RegistryState  the state that the parts share, and the only functions that apply a committed
 //                  change to it
 //   Committer      commits changes to the store in batches, in the order of submission
-//   ReadBarrier    blocks a call until the registry satisfies its freshness; replaced by PeerSync,
-//                  which applies the changes of peer servers, if there are any
-//   RecordReader   loads and lists records if the store finds records
-//   HullChanges    creates, deletes, replaces, and grows hulls
-//   BodyRegistry   puts, deletes, and finds bodies
+//   ReadBarrier    blocks a call until the registry satisfies its freshness; applies the changes of
+//                  peer servers, if there are any
+//   RecordReader   finds bodies; loads and lists records if the store finds records
+//   LocalChanges   creates, deletes, replaces, and grows hulls and bodies
 //   HullReader     serves hulls of a single snapshot
 //   ChangeFeed     sends the initial state and then every change to watches
 //
@@ -95,33 +91,19 @@ class Registry {
   // Budget for memory that calls hold for a long time (MemoryCharge).
   MemoryBudget& memory() { return state_.memory; }
 
-  // Creates, deletes, replaces, and grows hulls.
-  HullChanges& hulls() { return changes_; }
-  // Puts, deletes, and finds bodies.
-  BodyRegistry& bodies() { return bodies_; }
+  // Creates, deletes, replaces, and grows hulls and bodies.
+  LocalChanges& changes() { return changes_; }
+  // Finds bodies, and lists hulls and bodies.
+  RecordReader& records() { return records_; }
   // Serves hulls that are resolved repeatedly or without blocking, and their snapshots.
   HullReader& reader() { return reader_; }
-  // Waits for freshness. Required before functions without a freshness parameter: List and
-  // BodyRegistry::Find.
-  ReadBarrier& barrier() { return *barrier_; }
+  // Waits for freshness. Required before functions without a freshness parameter: those of
+  // records().
+  ReadBarrier& barrier() { return barrier_; }
   // True if peer servers commit to the same store, so that reads may wait for their changes.
-  bool has_peers() const { return barrier_->has_peers(); }
+  bool has_peers() const { return barrier_.has_peers(); }
   // False if no body exists. Takes no lock.
   bool has_bodies() const { return state_.BodyCount() > 0; }
-
-  // Returns at most `page_size` hulls, or bodies, or both, with IDs that start with `prefix` and
-  // follow `after` in byte order; a page of bodies may contain fewer even if more follow. If the
-  // store finds records, queries the store, and must not run on a gRPC thread. UNAVAILABLE: the
-  // store cannot be read. CANCELLED: should_stop returned true.
-  absl::StatusOr<RecordPage> List(std::string prefix, std::string after, size_t page_size,
-                                  const std::function<bool()>& should_stop = {},
-                                  RecordKinds kinds = {.hulls = true}) {
-    return records_.List({.prefix = std::move(prefix),
-                          .kinds = kinds,
-                          .after = std::move(after),
-                          .page_size = page_size},
-                         should_stop);
-  }
 
   // Puts small hulls to rest that have not been looked up since the previous call of this function
   // (HullTable). Call every few seconds. Cost: about 0.2 us per hull.
@@ -162,12 +144,10 @@ class Registry {
   Committer committer_;
   // Threads that read records, and help readers that load many hulls.
   std::optional<TaskPool> loaders_;
-  // A PeerSync if the store has peer servers.
-  const std::unique_ptr<ReadBarrier> barrier_;
+  ReadBarrier barrier_;
   RecordReader records_;
   HullReader reader_;
-  BodyRegistry bodies_;
-  HullChanges changes_;
+  LocalChanges changes_;
 };
 
 }  // namespace hulld::server

@@ -17,8 +17,6 @@
 #include "core/base/status_macros.h"
 #include "server/contract/status_map.h"
 #include "server/process/random_id.h"
-#include "server/store/change_encoding.h"
-#include "server/store/data_directory.h"
 #include "server/store/rocksdb_store.h"
 #include "server/store/store_errors.h"
 #include "server/store/store_keys.h"
@@ -221,7 +219,7 @@ absl::Status RocksDbStore::Lock() {
 absl::Status RocksDbStore::CheckLogs() {
   const std::string directory = DatabaseDirectory(options_.data_dir);
   const std::string path = LogMarkPath(options_.data_dir);
-  absl::StatusOr<std::optional<LogMark>> mark = LogMarkFile::Read(*files_, path);
+  absl::StatusOr<std::optional<LogMark>> mark = ReadLogMark(*files_, path);
   if (absl::IsDataLoss(mark.status())) {
     if (options_.accept_loss) return absl::OkStatus();
     return LogLost(options_.data_dir, std::string(mark.status().message()), std::nullopt);

@@ -6,7 +6,6 @@
 
 #include "core/base/status_macros.h"
 #include "server/store/rocksdb_store.h"
-#include "server/store/sealed_hull.h"
 #include "server/store/store_errors.h"
 #include "server/store/store_keys.h"
 
@@ -38,24 +37,6 @@ absl::StatusOr<std::optional<std::string>> RocksDbStore::Read(const std::string&
   if (!status.ok()) return ReadFailed(status);
   HULLD_ASSIGN_OR_RETURN(const std::string_view value, Unseal(key, sealed));
   return std::string(value);
-}
-
-// Bypasses the block cache, where the blocks of a scan would evict each other before reuse. The
-// result may pin parts of the database until it has been visited.
-void RocksDbStore::FindValues(std::span<const std::string> keys,
-                              const std::function<void(size_t, std::string_view)>& visit) {
-  const std::shared_lock lock(db_mutex_);
-  if (db_ == nullptr || keys.empty()) return;
-  const std::vector<rocksdb::Slice> slices(keys.begin(), keys.end());
-  std::vector<rocksdb::PinnableSlice> values(keys.size());
-  std::vector<rocksdb::Status> statuses(keys.size());
-  rocksdb::ReadOptions options;
-  options.fill_cache = false;
-  db_->MultiGet(options, db_->DefaultColumnFamily(), keys.size(), slices.data(), values.data(),
-                statuses.data());
-  for (size_t i = 0; i < keys.size(); ++i) {
-    if (statuses[i].ok()) visit(i, View(values[i]));
-  }
 }
 
 absl::StatusOr<std::optional<uint64_t>> RocksDbStore::ReadNumber(const std::string& key) {
@@ -123,12 +104,12 @@ absl::StatusOr<std::vector<Vector>> RocksDbStore::LoadVertices(const StoredHull&
 // Most hulls are one value: a base with a single part, or a single delta. Other hulls and damaged
 // values are read one by one, which yields the precise error.
 std::vector<absl::StatusOr<std::vector<Vector>>> RocksDbStore::LoadVerticesOfEach(
-    std::span<const StoredHull* const> hulls) {
+    std::span<const StoredHull> hulls) {
   std::vector<std::string> keys;
   std::vector<size_t> hull_of;
   for (size_t i = 0; i < hulls.size(); ++i) {
-    const HullRecord& record = hulls[i]->record;
-    const VertexLayout& layout = hulls[i]->layout;
+    const HullRecord& record = hulls[i].record;
+    const VertexLayout& layout = hulls[i].layout;
     const bool has_one_part = layout.base_vertices > 0 && layout.base_vertices <= kBasePartVertices;
     if (has_one_part && layout.delta_count == 0) {
       keys.push_back(BaseKey(record.create_revision, layout.base_revision, 0));
@@ -140,17 +121,29 @@ std::vector<absl::StatusOr<std::vector<Vector>>> RocksDbStore::LoadVerticesOfEac
   }
   std::vector<absl::StatusOr<std::vector<Vector>>> loaded(
       hulls.size(), absl::NotFoundError("the record has an unexpected number of values"));
-  FindValues(keys, [&](size_t at, std::string_view sealed) {
-    const StoredHull& hull = *hulls[hull_of[at]];
-    const absl::StatusOr<std::string_view> value = Unseal(keys[at], sealed);
-    VertexAssembly assembly(hull);
-    absl::Status status = hull.layout.delta_count == 0
-                              ? assembly.AddBasePart(value)
-                              : assembly.AddDelta(hull.record.revision, value);
-    loaded[hull_of[at]] = std::move(assembly).Finish(std::move(status));
-  });
+  if (const std::shared_lock lock(db_mutex_); db_ != nullptr && !keys.empty()) {
+    const std::vector<rocksdb::Slice> slices(keys.begin(), keys.end());
+    // May pin parts of the database.
+    std::vector<rocksdb::PinnableSlice> values(keys.size());
+    std::vector<rocksdb::Status> statuses(keys.size());
+    // In the block cache, the blocks of a scan would evict each other before reuse.
+    rocksdb::ReadOptions options;
+    options.fill_cache = false;
+    db_->MultiGet(options, db_->DefaultColumnFamily(), keys.size(), slices.data(), values.data(),
+                  statuses.data());
+    for (size_t k = 0; k < keys.size(); ++k) {
+      if (!statuses[k].ok()) continue;
+      const StoredHull& hull = hulls[hull_of[k]];
+      const absl::StatusOr<std::string_view> value = Unseal(keys[k], View(values[k]));
+      VertexAssembly assembly(hull);
+      absl::Status status = hull.layout.delta_count == 0
+                                ? assembly.AddBasePart(value)
+                                : assembly.AddDelta(hull.record.revision, value);
+      loaded[hull_of[k]] = std::move(assembly).Finish(std::move(status));
+    }
+  }
   for (size_t i = 0; i < hulls.size(); ++i) {
-    if (!loaded[i].ok()) loaded[i] = LoadVertices(*hulls[i]);
+    if (!loaded[i].ok()) loaded[i] = LoadVertices(hulls[i]);
   }
   return loaded;
 }

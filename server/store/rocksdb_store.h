@@ -4,6 +4,7 @@
 #include <absl/status/statusor.h>
 #include <rocksdb/db.h>
 #include <rocksdb/env.h>
+#include <rocksdb/write_batch.h>
 
 #include <atomic>
 #include <chrono>
@@ -22,11 +23,34 @@
 
 #include "server/store/files/disk_reserve.h"
 #include "server/store/files/log_file_system.h"
-#include "server/store/sealed_hull.h"
 #include "server/store/store.h"
 #include "server/store/store_keys.h"
 
 namespace hulld::server {
+
+// Paths in --data-dir.
+inline std::string DatabaseDirectory(const std::string& data_dir) { return data_dir + "/rocksdb"; }
+
+// A directory for temporary files, emptied at each start. Other files in the data directory are not
+// touched.
+inline std::string ScratchDirectory(const std::string& data_dir) {
+  return data_dir + "/hulld-scratch";
+}
+
+// The high-water mark of the write-ahead logs (files/log_mark.h).
+inline std::string LogMarkPath(const std::string& data_dir) { return data_dir + "/hulld-log-mark"; }
+
+// The reserve for a full disk (files/disk_reserve.h).
+inline std::string ReservePath(const std::string& data_dir) { return data_dir + "/hulld-reserve"; }
+
+// A file that 'hullctl backup restore' leaves in its new directory.
+inline std::string RestoredMark(const std::string& data_dir) { return data_dir + "/restored"; }
+
+// Adds a value with its checksum to the batch.
+void PutSealed(rocksdb::WriteBatch& batch, const std::string& key, std::string value);
+
+// Adds the effect of a change on the keys of the store (store_keys.h), except the store's revision.
+void EncodeChange(rocksdb::WriteBatch& batch, const Change& change);
 
 struct RocksDbOptions {
   // Created if missing, and on disk before the first acknowledgement.
@@ -80,7 +104,7 @@ class RocksDbStore : public Store {
   absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull& hull) override;
   // Reads the first values of all hulls together, so that a block with several values is one read.
   std::vector<absl::StatusOr<std::vector<Vector>>> LoadVerticesOfEach(
-      std::span<const StoredHull* const> hulls) override;
+      std::span<const StoredHull> hulls) override;
   absl::StatusOr<uint64_t> LoadSequence(const HullRecord& hull,
                                         const std::string& writer_id) override;
   absl::StatusOr<std::vector<WriterSequence>> LoadWriters(const StoredHull& hull) override;
@@ -139,9 +163,6 @@ class RocksDbStore : public Store {
   // it cannot be read.
   absl::StatusOr<std::optional<std::string>> Read(const std::string& key);
   absl::StatusOr<std::optional<uint64_t>> ReadNumber(const std::string& key);
-  // Visits the sealed values of these keys, by index. Missing and unreadable values are skipped.
-  void FindValues(std::span<const std::string> keys,
-                  const std::function<void(size_t, std::string_view)>& visit);
   absl::Status ScanRange(
       const std::string& begin, const std::string& end,
       const std::function<absl::Status(std::string_view, std::string_view)>& visit);

@@ -17,7 +17,7 @@
 #include "hulld/v1/freshness.pb.h"
 #include "hulld/v1/geometry.pb.h"
 #include "hulld/v1/hull.pb.h"
-#include "server/registry/inline_shapes.h"
+#include "server/registry/body_resolution.h"
 #include "server/registry/registry.h"
 
 namespace hulld::server {

@@ -58,7 +58,7 @@ void EndListed(Registry& registry, TaskPool& pool, UnaryCall* call, Rpc rpc, Rec
                            DecodePageToken(rpc, request.page_token(), prefix));
     const uint32_t asked =
         request.page_size() == 0 ? Config::kDefaultPageSize : request.page_size();
-    const absl::StatusOr<RecordPage> page = registry.List(
+    const absl::StatusOr<RecordPage> page = registry.records().List(
         prefix, after, std::min(asked, Config::kMaxPageSize),
         [call] { return call->call().ShouldStop(); }, kinds);
     if (!page.ok()) return page.status();
@@ -73,11 +73,10 @@ void EndListed(Registry& registry, TaskPool& pool, UnaryCall* call, Rpc rpc, Rec
   EndFresh(registry, pool, call, answer, !registry.store().finds_records());
 }
 
-// Ends a unary call that deletes a hull or a body after the deletion is committed. records: the
-// HullChanges or the BodyRegistry. kind: "hull" or "body".
-template <typename UnaryCall, typename Records>
-void EndDeleted(Registry& registry, UnaryCall* call, Records& records, const char* kind,
-                const std::string& id) {
+// Ends a unary call that deletes a hull or a body after the deletion is committed. kind: "hull" or
+// "body".
+template <typename UnaryCall>
+void EndDeleted(Registry& registry, UnaryCall* call, const char* kind, const std::string& id) {
   const absl::Status valid = CheckHullId(call->call().caller(), id, absl::StrCat(kind, "_id"));
   if (!valid.ok()) return call->End(valid);
   const auto done = [&registry, call, kind, &id](const absl::StatusOr<uint64_t>& revision) {
@@ -86,7 +85,7 @@ void EndDeleted(Registry& registry, UnaryCall* call, Records& records, const cha
     EncodeHeader(registry.store(), *revision, call->response().mutable_header());
     call->End(absl::OkStatus());
   };
-  records.Delete(id, IfRevision(call->request()), done);
+  registry.changes().Delete(kind, id, IfRevision(call->request()), done);
 }
 
 }  // namespace hulld::server

@@ -27,7 +27,6 @@
 #include "hulld/v1/collision.pb.h"
 #include "server/access/caller.h"
 #include "server/registry/body_resolution.h"
-#include "server/registry/inline_shapes.h"
 #include "server/registry/registry.h"
 #include "server/wire/decode.h"
 

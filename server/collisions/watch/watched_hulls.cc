@@ -116,7 +116,7 @@ absl::Status WatchedHulls::WatchPieces(std::span<const size_t> places,
                                        const std::function<bool()>& should_stop) {
   std::vector<std::vector<std::string>> hull_ids(places.size());
   if (registry_.has_bodies()) {
-    const FoundBodies found = registry_.bodies().Find(ids, should_stop);
+    const FoundBodies found = registry_.records().FindBodies(ids, should_stop);
     if (!found.status.ok()) return found.status;
     for (size_t n = 0; n < places.size(); ++n) {
       const Body* const body = found.bodies[n].get();

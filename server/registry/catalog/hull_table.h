@@ -20,7 +20,7 @@
 #include "server/registry/catalog/registry_types.h"
 #include "server/registry/memory/locked.h"
 #include "server/registry/memory/memory_budget.h"
-#include "server/store/hull_record.h"
+#include "server/store/records.h"
 
 namespace hulld::server {
 

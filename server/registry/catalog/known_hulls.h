@@ -7,7 +7,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -16,7 +15,6 @@
 #include <vector>
 
 #include "server/registry/catalog/registry_types.h"
-#include "server/registry/memory/hull_loader.h"
 
 namespace hulld::server {
 
@@ -81,24 +79,14 @@ class KnownHulls {
     uint32_t same_hash = kNone;
     bool is_due = false;
     bool is_prepared = false;
-    // is_loaded: read from the store for this lookup, in a batch. is_ahead: in a batch being read.
+    // True if it was read from the store for this lookup, together with others.
     bool is_loaded = false;
-    bool is_ahead = false;
     // Hull found when the read began; null if it must be looked up.
     HullPointer found;
     // Approximate bytes of the hull that this entry keeps in memory.
     uint64_t bytes = 0;
     // UNKNOWN until the hull is looked up; without a message, to avoid an allocation.
     absl::StatusOr<HullView> view = absl::Status(absl::StatusCode::kUnknown, "");
-  };
-
-  // Hulls being read from the store before their lookup.
-  struct Loading {
-    std::shared_ptr<LoadJob> job;
-    // Each hull of the job, and its index in hulls_.
-    std::vector<HullPointer> found;
-    std::vector<uint32_t> hulls;
-    uint64_t points = 0;
   };
 
  public:
@@ -128,10 +116,6 @@ class KnownHulls {
   absl::flat_hash_map<uint64_t, uint32_t> by_hash_;
   // Hulls to look up; processed from the back.
   std::vector<uint32_t> due_;
-  // Reads from the store, in the order of processing; empty between lookups.
-  std::vector<Loading> ahead_;
-  // Position in due_: the hulls from here on were already scanned for hulls to read.
-  size_t ahead_end_ = 0;
   // Changes before this position were applied; empty before the first lookup.
   std::optional<uint64_t> next_change_;
 };

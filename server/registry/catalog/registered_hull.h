@@ -24,7 +24,7 @@
 #include "server/registry/memory/locked.h"
 #include "server/registry/memory/memory_budget.h"
 #include "server/registry/memory/served_hull.h"
-#include "server/store/hull_record.h"
+#include "server/store/records.h"
 #include "server/store/store.h"
 
 namespace hulld::server {

@@ -19,8 +19,7 @@
 #include "server/process/synchronization.h"
 #include "server/registry/memory/memory_budget.h"
 #include "server/registry/memory/served_hull.h"
-#include "server/store/body_record.h"
-#include "server/store/hull_record.h"
+#include "server/store/records.h"
 
 // Arguments and results of the registry's functions.
 namespace hulld::server {
@@ -101,7 +100,7 @@ struct Replacement {
   // Sums over the points passed to the builder.
   PointCounts counts;
   // Vertices and live hull of the builder, for the store and for readers; set by
-  // HullChanges::Replace.
+  // LocalChanges::Replace.
   std::vector<Vector> vertices = {};
   std::shared_ptr<LiveHull> live = nullptr;
 };

@@ -10,28 +10,22 @@
 #include "server/contract/status_map.h"
 #include "server/contract/stopped_call.h"
 #include "server/registry/catalog/registered_hull.h"
-#include "server/registry/changes/hull_changes.h"
+#include "server/registry/changes/local_changes.h"
 #include "server/registry/memory/hull_loader.h"
 
 namespace hulld::server {
 
-struct HullChanges::OpenRequest {
+struct LocalChanges::OpenRequest {
   std::string hull_id;
   std::string writer_id;
   bool create_if_absent = false;
-  bool created_hull = false;
   std::function<void(const absl::Status&)> on_gone;
   Reply<OpenResult> done;
   ClientId client = kNoClient;
-  // The hull read for the request; keeps it known until the request is processed.
-  HullPointer known = nullptr;
 };
 
-// Result of checking a chunk that is allowed.
-enum class HullChanges::Verdict { kNew, kAlreadyApplied };
-
 // A chunk added to the builder, and its change to commit.
-struct HullChanges::BuiltChunk {
+struct LocalChanges::BuiltChunk {
   Change change;
   PointCounts counts;
   // Prefix of the LiveHull that includes this chunk.
@@ -89,85 +83,74 @@ void AnswerChunk(Locked& locked, const Reply<ChunkResult>& done, uint64_t sequen
 
 }  // namespace
 
-void HullChanges::OpenAppend(const std::string& id, const std::string& writer_id,
-                             bool create_if_absent,
-                             std::function<void(const absl::Status&)> on_gone,
-                             Reply<OpenResult> done, ClientId client) {
-  const auto request = std::make_shared<OpenRequest>(OpenRequest{
-      id, writer_id, create_if_absent, false, std::move(on_gone), std::move(done), client});
-  // May read the store.
-  barrier_.WhenFresh(request->done, [=, this](Locked&) { RunOpen(request); });
+void LocalChanges::OpenAppend(const std::string& id, const std::string& writer_id,
+                              bool create_if_absent,
+                              std::function<void(const absl::Status&)> on_gone,
+                              Reply<OpenResult> done, ClientId client) {
+  const auto request = std::make_shared<OpenRequest>(
+      OpenRequest{id, writer_id, create_if_absent, std::move(on_gone), std::move(done), client});
+  records_.WhenReady(id, RecordReader::For::kLife, request->done,
+                     [=, this](Locked& locked, const LockedTask& again) {
+                       const HullPointer hull = state_.Find(request->hull_id);
+                       if (hull == nullptr) return OpenNew(locked, request, again);
+                       // May query the store.
+                       writers_.Submit(
+                           [=, this] {
+                             Locked later(state_.mutex);
+                             OpenExisting(later, hull, request, again);
+                           },
+                           request->client);
+                     });
 }
 
-void HullChanges::RunOpen(const std::shared_ptr<OpenRequest>& request) {
-  writers_.Submit(
-      [this, request] {
-        Locked locked(state_.mutex);
-        OpenLocked(locked, request);
-      },
-      request->client);
+// The session opens in the completion of the creation, because the hull may be gone immediately
+// afterwards.
+void LocalChanges::OpenNew(Locked& locked, const std::shared_ptr<OpenRequest>& request,
+                           const LockedTask& again) {
+  if (!request->create_if_absent) {
+    return Answer(locked, request->done, state_.NoSuchHull(request->hull_id));
+  }
+  CreateNew(locked, request->hull_id,
+            [=, this](Locked& later, const absl::StatusOr<HullPointer>& created) {
+              if (Committer::IsSuperseded(created.status())) return later.AfterwardsLocked(again);
+              if (!created.ok()) return Answer(later, request->done, created.status());
+              OpenSession(later, *created, *request, true, 0);
+            });
 }
 
-// Runs on a thread of `writers_`. May release the mutex to query the store.
-void HullChanges::OpenLocked(Locked& locked, const std::shared_ptr<OpenRequest>& request) {
-  const auto refuse = [request](Locked& later, const absl::Status& status) {
-    Answer(later, request->done, status);
-  };
-  const std::string& id = request->hull_id;
-  const HullPointer known = std::exchange(request->known, nullptr);
-  if (!state_.IsKnown(id)) {
-    return records_.WhenKnown(locked, id, request->done, [this, request](Locked& later) {
-      const bool is_known = state_.IsKnown(request->hull_id);
-      if (is_known) request->known = state_.Find(request->hull_id);
-      // Without a hull, no further store read is needed.
-      if (is_known && request->known == nullptr) return OpenLocked(later, request);
-      RunOpen(request);
-    });
-  }
-  if (records_.MustWait(locked, id, RecordReader::For::kLife, request->done,
-                        [this, request](Locked&) { RunOpen(request); })) {
-    return;
-  }
-  const HullPointer hull = state_.Find(id);
-  if (hull == nullptr) {
-    if (!request->create_if_absent) return refuse(locked, state_.NoSuchHull(request->hull_id));
-    // The session opens in the completion of the creation, because the hull may be gone immediately
-    // afterwards.
-    return CreateNew(
-        locked, request->hull_id,
-        [this, request, refuse](Locked& later, const absl::StatusOr<HullPointer>& created) {
-          if (Committer::IsSuperseded(created.status())) return RunOpen(request);
-          if (!created.ok()) return refuse(later, created.status());
-          request->created_hull = true;
-          OpenSession(later, *created, request, 0);
-        });
-  }
-  if (hull->state.damaged()) return refuse(locked, hull->state.damage());
+// May release the mutex to query the store.
+void LocalChanges::OpenExisting(Locked& locked, const HullPointer& hull,
+                                const std::shared_ptr<OpenRequest>& request,
+                                const LockedTask& again) {
+  const auto has_ended = [&] { return hull->state.gone() || hull->state.changing_life(); };
+  if (has_ended()) return again(locked);
+  if (hull->state.damaged()) return Answer(locked, request->done, hull->state.damage());
   const absl::StatusOr<uint64_t> last = CommittedSequence(locked, *hull, request->writer_id);
-  if (!last.ok()) return refuse(locked, last.status());
+  if (!last.ok()) return Answer(locked, request->done, last.status());
   // The end of a hull removes its sequences from the store before the registry applies it.
-  if (hull->state.gone() || hull->state.changing_life()) return OpenLocked(locked, request);
+  if (has_ended()) return again(locked);
   if (*last == 0 && hull->head().writer_count >= state_.limits.max_writers_per_hull) {
-    return refuse(locked, TooManyWriters(hull->head(), state_.limits.max_writers_per_hull));
+    return Answer(locked, request->done,
+                  TooManyWriters(hull->head(), state_.limits.max_writers_per_hull));
   }
-  OpenSession(locked, hull, request, *last);
+  OpenSession(locked, hull, *request, false, *last);
 }
 
-void HullChanges::OpenSession(Locked& locked, const HullPointer& hull,
-                              const std::shared_ptr<OpenRequest>& request, uint64_t last_sequence) {
+void LocalChanges::OpenSession(Locked& locked, const HullPointer& hull, OpenRequest& request,
+                               bool created_hull, uint64_t last_sequence) {
   HULLD_CHECK(hull->state.visible());
   OpenResult result;
-  hull->watches.emplace(++last_watch_, std::move(request->on_gone));
+  hull->watches.emplace(++last_watch_, std::move(request.on_gone));
   result.store_revision = state_.revision();
   result.hull = hull->committed().record;
   result.last_sequence = last_sequence;
-  result.session = {hull, request->writer_id, request->created_hull, last_watch_, request->client};
-  Answer(locked, request->done, std::move(result));
+  result.session = {hull, request.writer_id, created_hull, last_watch_, request.client};
+  Answer(locked, request.done, std::move(result));
 }
 
 // Returns the last committed sequence of a writer. May release the mutex to query the store.
-absl::StatusOr<uint64_t> HullChanges::CommittedSequence(Locked& locked, RegisteredHull& hull,
-                                                        const std::string& writer_id) {
+absl::StatusOr<uint64_t> LocalChanges::CommittedSequence(Locked& locked, RegisteredHull& hull,
+                                                         const std::string& writer_id) {
   if (const auto known = hull.CommittedSequence(writer_id)) return *known;
   if (!state_.store.keeps_hulls() || hull.committed().writer_count == 0) return 0;
   const HullRecord record = hull.committed().record;
@@ -196,7 +179,7 @@ absl::StatusOr<uint64_t> HullChanges::CommittedSequence(Locked& locked, Register
   return *sequence;
 }
 
-void HullChanges::CloseAppend(const AppendSession& session) {
+void LocalChanges::CloseAppend(const AppendSession& session) {
   Locked locked(state_.mutex);
   RegisteredHull& hull = *session.hull;
   hull.watches.erase(session.watch);
@@ -207,9 +190,9 @@ void HullChanges::CloseAppend(const AppendSession& session) {
   state_.hulls.RestSoon(locked, hull);
 }
 
-void HullChanges::Append(const AppendSession& session, Chunk chunk,
-                         std::function<bool()> should_stop, std::function<void()> on_built,
-                         Reply<ChunkResult> done) {
+void LocalChanges::Append(const AppendSession& session, Chunk chunk,
+                          std::function<bool()> should_stop, std::function<void()> on_built,
+                          Reply<ChunkResult> done) {
   Locked locked(state_.mutex);
   const uint64_t bytes = chunk.points.capacity() * sizeof(Vector);
   session.hull->chunks.push_back(
@@ -218,7 +201,7 @@ void HullChanges::Append(const AppendSession& session, Chunk chunk,
   Advance(locked, session.hull);
 }
 
-void HullChanges::RunNextChunk(const HullPointer& hull) {
+void LocalChanges::RunNextChunk(const HullPointer& hull) {
   Locked locked(state_.mutex);
   HULLD_CHECK(hull->state.work() == HullState::Work::kScheduled && !hull->chunks.empty());
   PendingChunk pending = std::move(hull->chunks.front());
@@ -234,7 +217,7 @@ void HullChanges::RunNextChunk(const HullPointer& hull) {
 }
 
 // Refuses the chunks of a hull that can no longer grow.
-void HullChanges::RefuseChunks(const HullPointer& hull) {
+void LocalChanges::RefuseChunks(const HullPointer& hull) {
   Locked locked(state_.mutex);
   HULLD_CHECK(hull->state.gone() || hull->state.damaged());
   const absl::Status reason = hull->state.gone() ? GoneWhileStreaming(*hull) : hull->state.damage();
@@ -246,22 +229,21 @@ void HullChanges::RefuseChunks(const HullPointer& hull) {
 
 // Answers a chunk, or submits its change, whose completion answers it. Releases the mutex while
 // building.
-void HullChanges::ApplyChunk(Locked& locked, const HullPointer& hull, PendingChunk& pending) {
+void LocalChanges::ApplyChunk(Locked& locked, const HullPointer& hull, PendingChunk& pending) {
   const uint64_t sequence = pending.chunk.sequence;
-  absl::StatusOr<Verdict> verdict = CheckChunk(locked, *hull, pending);
+  absl::StatusOr<bool> is_new = CheckChunk(locked, *hull, pending);
   // Without a commit, no store write detects a stale state, so compare explicitly.
-  const bool is_new = verdict.ok() && *verdict == Verdict::kNew;
-  if (!is_new && barrier_.has_peers()) {
+  if (!is_new.value_or(false) && barrier_.has_peers()) {
     const absl::Status fresh = barrier_.AwaitPeers(locked, pending.should_stop);
-    verdict = fresh.ok() ? CheckChunk(locked, *hull, pending) : fresh;
+    is_new = fresh.ok() ? CheckChunk(locked, *hull, pending) : fresh;
     // An earlier chunk must be rebuilt first.
     if (hull->IsQueuedBefore(pending)) {
       hull->Requeue(std::move(pending));
       return;
     }
   }
-  if (!verdict.ok()) return AnswerChunk(locked, pending.done, sequence, verdict.status());
-  if (*verdict == Verdict::kAlreadyApplied) {
+  if (!is_new.ok()) return AnswerChunk(locked, pending.done, sequence, is_new.status());
+  if (!*is_new) {
     const HullRecord& record = hull->committed().record;
     return AnswerChunk(
         locked, pending.done, sequence,
@@ -280,15 +262,16 @@ void HullChanges::ApplyChunk(Locked& locked, const HullPointer& hull, PendingChu
   SubmitChunk(locked, hull, pending, *std::move(built));
 }
 
-// Checks a chunk before building. May release the mutex to query the store.
-absl::StatusOr<HullChanges::Verdict> HullChanges::CheckChunk(Locked& locked, RegisteredHull& hull,
-                                                             const PendingChunk& pending) {
+// Checks a chunk before building. Returns false if it was already applied. May release the mutex to
+// query the store.
+absl::StatusOr<bool> LocalChanges::CheckChunk(Locked& locked, RegisteredHull& hull,
+                                              const PendingChunk& pending) {
   if (hull.state.gone()) return GoneWhileStreaming(hull);
   const Chunk& chunk = pending.chunk;
   const std::string& writer_id = pending.session.writer_id;
   HULLD_ASSIGN_OR_RETURN(const uint64_t committed, CommittedSequence(locked, hull, writer_id));
   if (hull.state.gone()) return GoneWhileStreaming(hull);
-  if (chunk.sequence <= committed) return Verdict::kAlreadyApplied;
+  if (chunk.sequence <= committed) return false;
   const uint64_t last = hull.HeadSequence(writer_id);
   if (chunk.sequence != last + 1) {
     return WithReason(absl::FailedPreconditionError(absl::StrCat(
@@ -306,13 +289,13 @@ absl::StatusOr<HullChanges::Verdict> HullChanges::CheckChunk(Locked& locked, Reg
   HULLD_RETURN_IF_ERROR(CheckChunkRevision(pending.session, record, chunk));
   HULLD_RETURN_IF_ERROR(CheckPointCount(record, chunk, state_.limits));
   HULLD_RETURN_IF_ERROR(state_.memory.Check(locked, MemoryUse::kWriting));
-  return Verdict::kNew;
+  return true;
 }
 
 // Adds a chunk to its hull's builder, without the mutex. On success `head` and the writer's
 // sequence include it.
-absl::StatusOr<HullChanges::BuiltChunk> HullChanges::Build(Locked& locked, RegisteredHull& hull,
-                                                           PendingChunk& pending) {
+absl::StatusOr<LocalChanges::BuiltChunk> LocalChanges::Build(Locked& locked, RegisteredHull& hull,
+                                                             PendingChunk& pending) {
   // A reader may have found damage during a release of the mutex.
   if (hull.state.damaged()) return hull.state.damage();
   hull.state.StartBuilding();
@@ -351,8 +334,8 @@ absl::StatusOr<HullChanges::BuiltChunk> HullChanges::Build(Locked& locked, Regis
 
 // Returns the LiveHull to append to. Releases the mutex to read it from the store if it is not in
 // memory. A writer does not wait for a reader that loads the same hull; the first to finish wins.
-absl::StatusOr<std::shared_ptr<LiveHull>> HullChanges::LiveForWriter(Locked& locked,
-                                                                     RegisteredHull& hull) {
+absl::StatusOr<std::shared_ptr<LiveHull>> LocalChanges::LiveForWriter(Locked& locked,
+                                                                      RegisteredHull& hull) {
   if (hull.live() != nullptr) return hull.live();
   HULLD_CHECK(hull.state.in_flight() == 0);
   const StoredHull stored = hull.committed();
@@ -382,8 +365,8 @@ absl::StatusOr<std::shared_ptr<LiveHull>> HullChanges::LiveForWriter(Locked& loc
 // Adds a chunk's points to the lent builder, after its backlog; builds the builder from the
 // committed points if it is missing. Appends the new vertices to the LiveHull and fills the change
 // with the data to store. Called without the mutex.
-absl::StatusOr<PointCounts> HullChanges::AddPoints(PendingChunk& pending, LentBuilder& lent,
-                                                   LiveHull& live, BuiltChunk& built) {
+absl::StatusOr<PointCounts> LocalChanges::AddPoints(PendingChunk& pending, LentBuilder& lent,
+                                                    LiveHull& live, BuiltChunk& built) {
   Change& change = built.change;
   std::unique_ptr<HullBuilder>& builder = lent.builder;
   if (builder != nullptr && !BringUp(*builder, lent.backlog, change.hull.record)) {
@@ -416,7 +399,7 @@ absl::StatusOr<PointCounts> HullChanges::AddPoints(PendingChunk& pending, LentBu
 }
 
 // Returns the writer's status for a failure of AddPoints.
-absl::Status HullChanges::WhyNotBuilt(RegisteredHull& hull, const absl::Status& cause) {
+absl::Status LocalChanges::WhyNotBuilt(RegisteredHull& hull, const absl::Status& cause) {
   if (absl::IsDataLoss(cause)) state_.MarkDamaged(hull, cause);
   if (!absl::IsResourceExhausted(cause)) return cause;
   return LimitExceeded(
@@ -424,8 +407,8 @@ absl::Status HullChanges::WhyNotBuilt(RegisteredHull& hull, const absl::Status& 
       state_.limits.max_vertices_per_hull, "max-vertices-per-hull");
 }
 
-void HullChanges::SubmitChunk(Locked& locked, const HullPointer& hull, PendingChunk& pending,
-                              BuiltChunk built) {
+void LocalChanges::SubmitChunk(Locked& locked, const HullPointer& hull, PendingChunk& pending,
+                               BuiltChunk built) {
   // If a peer server may commit first, keeps the chunk for a retry.
   std::shared_ptr<PendingChunk> kept;
   const Reply<ChunkResult> done = pending.done;

@@ -4,12 +4,12 @@
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
-#include <numeric>
 #include <string>
 #include <utility>
 
 #include "core/numeric/orientation.h"
 #include "server/contract/stopped_call.h"
+#include "server/process/shared_loop.h"
 #include "server/store/store_errors.h"
 
 namespace hulld::server {
@@ -23,12 +23,12 @@ bool SpanSpace(std::span<const Vector> points) {
          });
 }
 
-// Maximum numbers of points, excluding the last hull, and of hulls that a thread loads per step,
-// which takes about 50 us.
-constexpr uint64_t kPointsAtOnce = 1024;
-constexpr size_t kHullsAtOnce = 16;
-// Minimum number of parts of a large job: small parts let all threads finish together.
-constexpr size_t kMinParts = 8;
+// Maximum number of hulls that a thread loads per step; takes about 50 us for small hulls.
+constexpr size_t kMaxPerStep = 16;
+// Minimum number of steps of a large load: small steps let all threads finish together.
+constexpr size_t kMinSteps = 8;
+// Loading this many small hulls takes longer than waking a thread.
+constexpr size_t kWorthAThread = 8;
 
 uint64_t PointCount(const StoredHull& stored) {
   return stored.layout.base_vertices + stored.layout.delta_vertices;
@@ -62,46 +62,22 @@ absl::StatusOr<std::shared_ptr<LiveHull>> LoadLive(Store& store, const StoredHul
   return MakeLive(stored, store.LoadVertices(stored));
 }
 
-LoadJob::LoadJob(Store& store, std::vector<StoredHull> hulls, TaskPool& helpers)
-    : store_(store),
-      hulls_(std::move(hulls)),
-      order_(hulls_.size()),
-      loaded_(hulls_.size(), Cancelled()) {
-  std::iota(order_.begin(), order_.end(), 0);
-  // Hulls created one after the other are adjacent in the store.
-  std::ranges::sort(order_, {}, [&](uint32_t i) { return hulls_[i].record.create_revision; });
-  const size_t most = std::clamp<size_t>(order_.size() / kMinParts, 1, kHullsAtOnce);
-  uint64_t points = 0;
-  size_t begin = 0;
-  for (uint32_t n = 0; n < order_.size(); ++n) {
-    points += PointCount(hulls_[order_[n]]);
-    const size_t taken = n + 1 - begin;
-    if (points < kPointsAtOnce && taken < most && n + 1 < order_.size()) continue;
-    ends_.push_back(n + 1);
-    points = 0;
-    begin = n + 1;
-  }
-  // Loading this many small hulls takes longer than waking a thread.
-  constexpr size_t kWorthAThread = 8;
-  loop_ = SharedLoop::Start(helpers, std::min(helpers.threads(), hulls_.size() / kWorthAThread),
-                            ends_.size(), 1, [this](size_t part, size_t) { LoadPart(part); });
-}
-
-void LoadJob::LoadPart(size_t part) {
-  const uint32_t begin = part == 0 ? 0 : ends_[part - 1];
-  const std::span some = std::span(order_).subspan(begin, ends_[part] - begin);
-  std::vector<const StoredHull*> stored;
-  stored.reserve(some.size());
-  for (const uint32_t i : some) stored.push_back(&hulls_[i]);
-  std::vector<absl::StatusOr<std::vector<Vector>>> points = store_.LoadVerticesOfEach(stored);
-  for (size_t n = 0; n < some.size(); ++n) {
-    loaded_[some[n]] = MakeLive(*stored[n], std::move(points[n]));
-  }
-}
-
-std::vector<LoadJob::Loaded> LoadJob::Finish(const std::function<bool()>& should_stop) {
-  loop_->Finish(should_stop);
-  return std::move(loaded_);
+std::vector<LoadedHull> LoadEach(Store& store, std::span<const StoredHull> hulls, TaskPool& helpers,
+                                 const std::function<bool()>& should_stop) {
+  // Each element is written by one thread, and read after all have ended.
+  std::vector<LoadedHull> loaded(hulls.size(), Cancelled());
+  const auto load = [&](size_t begin, size_t end) {
+    std::vector<absl::StatusOr<std::vector<Vector>>> points =
+        store.LoadVerticesOfEach(hulls.subspan(begin, end - begin));
+    for (size_t i = begin; i < end; ++i) {
+      loaded[i] = MakeLive(hulls[i], std::move(points[i - begin]));
+    }
+  };
+  SharedLoop::Start(helpers, std::min(helpers.threads(), hulls.size() / kWorthAThread),
+                    hulls.size(), std::clamp<size_t>(hulls.size() / kMinSteps, 1, kMaxPerStep),
+                    load)
+      ->Finish(should_stop);
+  return loaded;
 }
 
 absl::StatusOr<std::unique_ptr<HullBuilder>> BuildHull(const HullRecord& record,

@@ -1,6 +1,8 @@
 #ifndef HULLD_SERVER_REGISTRY_MEMORY_LOCKED_H_
 #define HULLD_SERVER_REGISTRY_MEMORY_LOCKED_H_
 
+#include <absl/status/status.h>
+
 #include <algorithm>
 #include <atomic>
 #include <chrono>
@@ -8,10 +10,12 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <utility>
 #include <vector>
 
 #include "core/base/check.h"
+#include "server/contract/stopped_call.h"
 #include "server/process/synchronization.h"
 
 namespace hulld::server {
@@ -143,15 +147,39 @@ class Locked {
     mutex_.BeginHold();
   }
 
+  // Runs the deferred tasks, then blocks until is_over() returns true; `changed` is notified when
+  // it may. CANCELLED: should_stop, which may be empty, returned true.
+  absl::Status Await(ConditionVariable& changed, const std::function<bool()>& should_stop,
+                     const std::function<bool()>& is_over) {
+    Yield();
+    while (!is_over()) {
+      WaitOn([&](auto& lock) { changed.wait_for(lock, kStopPoll, is_over); });
+      if (Stopped(should_stop)) return Cancelled();
+    }
+    return absl::OkStatus();
+  }
+
+  // Calls start(done), then blocks as Await until done(result) has been called with the mutex held,
+  // perhaps on another thread, and returns the result.
+  template <typename Result, typename Start>
+  Result AwaitResult(const std::function<bool()>& should_stop, const Start& start) {
+    struct Wait {
+      ConditionVariable changed;
+      std::optional<Result> result;
+    };
+    const auto wait = std::make_shared<Wait>();
+    start([wait](Result result) {
+      wait->result = std::move(result);
+      wait->changed.notify_all();
+    });
+    absl::Status s = Await(wait->changed, should_stop, [&] { return wait->result.has_value(); });
+    if (!s.ok()) return s;
+    return *std::move(wait->result);
+  }
+
   // Counts a lookup within this hold of the mutex.
   void NoteLookup() { ++mutex_.lookups_; }
   uint64_t lookups() const { return mutex_.lookups_; }
-
-  // Counts one of many lookups; first yields the mutex after kMaxLookupsPerHold of them.
-  void NoteLookupMaybeYield() {
-    if (lookups() == kMaxLookupsPerHold) Yield();
-    NoteLookup();
-  }
 
   void Afterwards(std::function<void()> task) { afterwards_.push_back(std::move(task)); }
   // Defers a task that acquires the mutex again.

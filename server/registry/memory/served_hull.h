@@ -15,7 +15,7 @@
 #include "core/query/placed/query_hull.h"
 #include "server/process/synchronization.h"
 #include "server/registry/memory/memory_budget.h"
-#include "server/store/hull_record.h"
+#include "server/store/records.h"
 
 namespace hulld::server {
 

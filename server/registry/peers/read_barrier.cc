@@ -2,13 +2,13 @@
 
 #include <absl/strings/str_cat.h>
 
-#include <memory>
+#include <algorithm>
+#include <utility>
 
 #include "core/base/check.h"
 #include "core/base/status_macros.h"
 #include "server/contract/error_info.h"
-#include "server/contract/stopped_call.h"
-#include "server/process/synchronization.h"
+#include "server/registry/catalog/registered_hull.h"
 
 namespace hulld::server {
 namespace {
@@ -26,30 +26,41 @@ absl::Status FutureRevision(uint64_t wanted, uint64_t current) {
 
 }  // namespace
 
+ReadBarrier::ReadBarrier(RegistryState& state, Committer& committer)
+    : state_(state), committer_(committer), feed_(state.store.peers()) {
+  committer_.SetPeers(*this);
+}
+
+// The pages of the initial load span more than one revision.
+absl::Status ReadBarrier::Begin(Locked& locked, std::vector<PeerChangeListener*> listeners) {
+  if (!has_peers()) return absl::OkStatus();
+  listeners_ = std::move(listeners);
+  const SteadyClock::time_point asked = SteadyClock::now();
+  absl::Status fetched = feed_->Fetch();
+  Apply(locked, feed_->TakeChanges());
+  if (fetched.ok()) NoteSynced(asked);
+  feed_->OnPeerCommit([this] { committer_.AddBarrier([](Locked&, const absl::Status&) {}); });
+  return fetched;
+}
+
+void ReadBarrier::End() {
+  if (has_peers()) feed_->OnPeerCommit(nullptr);
+}
+
 absl::Status ReadBarrier::AwaitCommits(Locked& locked, const std::function<bool()>& should_stop) {
-  struct Wait {
-    ConditionVariable changed;
-    std::optional<absl::Status> status;
-  };
-  const auto wait = std::make_shared<Wait>();
-  committer_.StartBarrier(locked, [wait](Locked&, const absl::Status& status) {
-    wait->status = status;
-    wait->changed.notify_all();
+  return locked.AwaitResult<absl::Status>(should_stop, [&](const auto& done) {
+    committer_.StartBarrier(locked, [done](Locked&, const absl::Status& s) { done(s); });
   });
-  // Runs the deferred tasks before waiting.
-  locked.Yield();
-  const auto is_over = [&] { return wait->status.has_value(); };
-  while (!is_over()) {
-    locked.WaitOn([&](auto& lock) { wait->changed.wait_for(lock, kStopPoll, is_over); });
-    if (Stopped(should_stop)) return Cancelled();
-  }
-  return *wait->status;
 }
 
 absl::Status ReadBarrier::AwaitPeers(const std::function<bool()>& should_stop) {
   if (!has_peers()) return absl::OkStatus();
   Locked locked(state_.mutex);
-  return AwaitPeers(locked, should_stop);
+  return AwaitCommits(locked, should_stop);
+}
+
+absl::Status ReadBarrier::AwaitPeers(Locked& locked, const std::function<bool()>& should_stop) {
+  return has_peers() ? AwaitCommits(locked, should_stop) : absl::OkStatus();
 }
 
 std::optional<nanoseconds> ReadBarrier::TryFresh(const Freshness& freshness) {
@@ -60,12 +71,21 @@ std::optional<nanoseconds> ReadBarrier::TryFresh(const Freshness& freshness) {
 
 std::optional<nanoseconds> ReadBarrier::TryFresh(Locked& /*locked*/, const Freshness& freshness) {
   if (state_.revision() < freshness.at_least_revision) return std::nullopt;
-  return nanoseconds(0);
+  if (!has_peers()) return nanoseconds(0);
+  if (!synced_at_.has_value()) return std::nullopt;
+  const SteadyClock::time_point began =
+      freshness.began.has_value() ? *freshness.began : SteadyClock::now();
+  const nanoseconds staleness = std::max<nanoseconds>(began - *synced_at_, nanoseconds(0));
+  if (!freshness.max_staleness.has_value()) return staleness;
+  if (staleness > *freshness.max_staleness) return std::nullopt;
+  if (staleness > *freshness.max_staleness / 2 && !std::exchange(is_fetching_ahead_, true)) {
+    committer_.AddBarrier([this](Locked&, const absl::Status&) { is_fetching_ahead_ = false; });
+  }
+  return staleness;
 }
 
 absl::StatusOr<nanoseconds> ReadBarrier::AwaitFresh(const Freshness& freshness,
                                                     const std::function<bool()>& should_stop) {
-  if (!has_peers() && freshness.at_least_revision == 0) return nanoseconds(0);
   Locked locked(state_.mutex);
   return AwaitFresh(locked, freshness, should_stop);
 }
@@ -79,11 +99,69 @@ absl::StatusOr<nanoseconds> ReadBarrier::AwaitFresh(Locked& locked, const Freshn
   return FutureRevision(freshness.at_least_revision, revision);
 }
 
-void ReadBarrier::WhenFresh(Refusal /*refuse*/, LockedTask next) {
+void ReadBarrier::StartFetch(std::function<void(const absl::Status&)> done) {
+  if (!has_peers()) return done(absl::OkStatus());
   Locked locked(state_.mutex);
-  next(locked);
+  committer_.StartBarrier(locked,
+                          [done = std::move(done)](Locked& later, const absl::Status& status) {
+                            later.Afterwards([done, status] { done(status); });
+                          });
 }
 
-void ReadBarrier::Defer(LockedTask /*task*/) { HULLD_CHECK(has_peers()); }
+void ReadBarrier::WhenFresh(Refusal refuse, LockedTask next) {
+  Locked locked(state_.mutex);
+  if (!has_peers()) return next(locked);
+  committer_.AddBarrier(RunOrRefuse(std::move(refuse), std::move(next)));
+}
+
+Committer::Barrier ReadBarrier::RunOrRefuse(Refusal refuse, LockedTask next) {
+  return [refuse = std::move(refuse), next = std::move(next)](Locked& locked,
+                                                              const absl::Status& status) {
+    if (status.ok()) return next(locked);
+    locked.Afterwards([refuse, status] { refuse(status); });
+  };
+}
+
+void ReadBarrier::Defer(LockedTask task) {
+  HULLD_CHECK(has_peers());
+  deferred_.push_back(std::move(task));
+}
+
+std::vector<HullGrowth> ReadBarrier::GrownHulls(const PeerChanges& changes) const {
+  std::vector<HullGrowth> grown;
+  uint64_t points = 0;
+  const HullTable::Entries& all = state_.hulls.entries();
+  for (const auto& [id, change] : changes.by_id) {
+    if (!change.hull.has_value() || !change.hull->ok()) continue;
+    const auto found = all.find(id);
+    if (found == all.end() || found->second.awake() == nullptr) continue;
+    const RegisteredHull& hull = *found->second.awake();
+    const StoredHull& stored = **change.hull;
+    if (!hull.GrewInto(stored)) continue;
+    points += stored.layout.delta_vertices - hull.committed().layout.delta_vertices;
+    if (grown.size() == kMaxGrownHulls || points > kMaxGrowth) break;
+    grown.push_back({hull.committed(), stored});
+  }
+  return grown;
+}
+
+void ReadBarrier::Apply(Locked& locked, const PeerChanges& changes) {
+  std::vector<std::pair<uint64_t, const std::string*>> in_order;
+  in_order.reserve(changes.by_id.size());
+  for (const auto& [id, change] : changes.by_id) in_order.emplace_back(change.revision, &id);
+  std::ranges::sort(in_order);
+  const uint64_t since = state_.revision();
+  for (const auto& [revision, id] : in_order) {
+    const auto hull = state_.ApplyPeerChange(locked, *id, changes.by_id.at(*id), since);
+    for (PeerChangeListener* const each : listeners_) each->OnPeerChange(locked, *id, hull);
+    state_.hulls.RestSome(locked);
+    state_.bodies.DropSome(locked);
+  }
+  if (state_.is_cache() && changes.revision > 0) state_.SetTotals(changes.totals);
+  if (changes.revision > state_.revision()) state_.ApplyOther(locked, changes.revision);
+  state_.memory.Evict(locked);
+  // Tasks deferred by these tasks wait for the next changes.
+  for (const LockedTask& task : std::exchange(deferred_, {})) task(locked);
+}
 
 }  // namespace hulld::server

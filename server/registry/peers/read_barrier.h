@@ -5,14 +5,18 @@
 #include <absl/status/statusor.h>
 
 #include <chrono>
+#include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "server/process/synchronization.h"
 #include "server/registry/commit/committer.h"
 #include "server/registry/memory/locked.h"
 #include "server/registry/state/registry_state.h"
+#include "server/store/store.h"
 
 namespace hulld::server {
 
@@ -25,29 +29,38 @@ class PeerChangeListener {
   virtual void OnPeerChange(Locked& locked, const std::string& id, const HullPointer& hull) = 0;
 };
 
-// Blocks calls until the registry satisfies their freshness. This class is the barrier of a store
-// without peer servers, which is always current; PeerSync overrides it.
+// Blocks calls until the registry satisfies their freshness. If the store has a PeerFeed, follows
+// the commits of peer servers and applies them to the registry's state; otherwise the registry is
+// always current.
+//
+// Peer changes are applied on the committer's thread, after the superseded local changes were
+// refused, so no local change to the same IDs is being committed. A thread may still build a chunk
+// on such a hull, or read its record; the state of the hull, or of the reading, shows that it was
+// superseded. Tasks that depend on a changed ID run after all changes of the same fetch are applied
+// (Defer).
 //
 // Functions with a Locked parameter require the registry's mutex; blocking ones release it. The
 // other functions acquire it.
-class ReadBarrier {
+class ReadBarrier : public Committer::Peers {
  public:
-  // Both must outlive this.
-  ReadBarrier(RegistryState& state, Committer& committer) : state_(state), committer_(committer) {}
+  // Maximum number of hulls that grow by peer servers' points within one hold of the mutex, and of
+  // their points in total; takes a few milliseconds.
+  static constexpr size_t kMaxGrownHulls = 1 << 10;
+  static constexpr uint64_t kMaxGrowth = 1 << 16;
+
+  // Both must outlive this. Registers with the committer.
+  ReadBarrier(RegistryState& state, Committer& committer);
   ReadBarrier(const ReadBarrier&) = delete;
   ReadBarrier& operator=(const ReadBarrier&) = delete;
-  virtual ~ReadBarrier() = default;
 
   // True if a peer server may change an ID before a submitted change of it commits; the change is
   // then retried.
-  virtual bool has_peers() const { return false; }
+  bool has_peers() const { return feed_ != nullptr; }
 
   // Applies the peer changes since the initial load, and follows the feed until End. listeners: in
   // the order of notification. Call once, before the first change.
-  virtual absl::Status Begin(Locked& /*locked*/, std::vector<PeerChangeListener*> /*listeners*/) {
-    return absl::OkStatus();
-  }
-  virtual void End() {}
+  absl::Status Begin(Locked& locked, std::vector<PeerChangeListener*> listeners);
+  void End();
 
   // Blocks until all changes that were submitted here, or committed by peer servers, before the
   // call are applied. CANCELLED: should_stop, which may be empty, returned true. UNAVAILABLE: the
@@ -55,18 +68,16 @@ class ReadBarrier {
   absl::Status AwaitCommits(Locked& locked, const std::function<bool()>& should_stop);
 
   // Read barrier: blocks until all changes that peer servers committed before the call are applied.
-  // Required before functions without a freshness parameter (Registry::List, BodyRegistry::Find).
-  // Not for gRPC threads. Errors and cost as AwaitCommits; no effect without peer servers.
+  // Required before functions without a freshness parameter (RecordReader::List,
+  // RecordReader::FindBodies). Not for gRPC threads. Errors and cost as AwaitCommits; no effect
+  // without peer servers.
   absl::Status AwaitPeers(const std::function<bool()>& should_stop);
-  virtual absl::Status AwaitPeers(Locked& /*locked*/,
-                                  const std::function<bool()>& /*should_stop*/) {
-    return absl::OkStatus();
-  }
+  absl::Status AwaitPeers(Locked& locked, const std::function<bool()>& should_stop);
 
-  // Returns the bound on staleness if the registry satisfies `freshness`, else nullopt.
+  // Returns the bound on staleness if the registry satisfies `freshness`, else nullopt. If the
+  // registry will soon be too stale, fetches ahead, so that later reads need not wait.
   std::optional<std::chrono::nanoseconds> TryFresh(const Freshness& freshness);
-  virtual std::optional<std::chrono::nanoseconds> TryFresh(Locked& locked,
-                                                           const Freshness& freshness);
+  std::optional<std::chrono::nanoseconds> TryFresh(Locked& locked, const Freshness& freshness);
   // Blocks until TryFresh succeeds and returns its result. FAILED_PRECONDITION: the store has not
   // assigned that revision. Other errors as AwaitPeers. Cost: a store query only if the registry is
   // too stale.
@@ -77,18 +88,35 @@ class ReadBarrier {
   // Requests the changes committed by peer servers so far and calls `done` exactly once after they
   // are applied, on this or another thread, without holding a lock. Errors and cost as AwaitPeers,
   // without blocking.
-  virtual void StartFetch(std::function<void(const absl::Status&)> done) { done(absl::OkStatus()); }
+  void StartFetch(std::function<void(const absl::Status&)> done);
   // Runs `next`, which determines the answer to a call, after the changes committed by peer servers
   // so far are applied; or calls `refuse` with the error, without holding a lock.
-  virtual void WhenFresh(Refusal refuse, LockedTask next);
+  void WhenFresh(Refusal refuse, LockedTask next);
+  // Returns a function that runs `next`, or calls `refuse` with the error, without holding a lock.
+  static Committer::Barrier RunOrRefuse(Refusal refuse, LockedTask next);
 
   // Defers a task, which depends on an ID that a peer server changed, until that change is applied.
   // Requires has_peers().
-  virtual void Defer(LockedTask task);
+  void Defer(LockedTask task);
 
- protected:
+  // Returns the hulls in memory that only grew, up to the limits of a single hold of the mutex. The
+  // committed state does not change before Apply, because the same thread calls both.
+  std::vector<HullGrowth> GrownHulls(const PeerChanges& changes) const override;
+  void Apply(Locked& locked, const PeerChanges& changes) override;
+  void NoteSynced(SteadyClock::time_point asked) override { synced_at_ = asked; }
+
+ private:
   RegistryState& state_;
   Committer& committer_;
+  // Null without peer servers.
+  PeerFeed* const feed_;
+  std::vector<PeerChangeListener*> listeners_;
+  // The registry's mutex guards the members below.
+  std::vector<LockedTask> deferred_;
+  // Time at which the last answered query was sent; all commits of peer servers before it are
+  // applied. nullopt before the first query.
+  std::optional<SteadyClock::time_point> synced_at_;
+  bool is_fetching_ahead_ = false;
 };
 
 }  // namespace hulld::server

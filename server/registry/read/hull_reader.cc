@@ -23,20 +23,6 @@ struct HullReader::HullsRead {
   const ReadPlan& plan;
 };
 
-// Updates the views of all due hulls. Releases the mutex after a number of lookups, and, if
-// allowed, to read from the store and to prepare. CANCELLED: should_stop returned true.
-absl::Status HullReader::LookUpDue(Locked& locked, const HullsRead& read) {
-  absl::Status status = LookUpAll(locked, read);
-  // After a success no load is left, so the mutex stays held.
-  if (!status.ok()) {
-    KnownHulls& known = read.known;
-    const std::function<bool()> stop = [] { return true; };
-    EndAllLoading(locked, {read.ids, known, stop, read.plan});
-    for (const uint32_t k : known.due_) known.hulls_[k].found = nullptr;
-  }
-  return status;
-}
-
 // Finds the hulls due next and loads them into the processor's caches, so that their cache misses
 // overlap: a lookup reads about twenty cache lines, each found through another. Returns the number
 // of due hulls that remain after them.
@@ -62,6 +48,8 @@ size_t HullReader::FindAhead(const HullsRead& read) {
   return known.due_.size() - count;
 }
 
+// Updates the views of all due hulls. Releases the mutex after a number of lookups, and, if
+// allowed, to read from the store and to prepare. CANCELLED: should_stop returned true.
 absl::Status HullReader::LookUpAll(Locked& locked, const HullsRead& read) {
   KnownHulls& known = read.known;
   if (!known.next_change_.has_value()) known.next_change_ = state_.recent_changes.end();
@@ -81,8 +69,6 @@ absl::Status HullReader::LookUpAll(Locked& locked, const HullsRead& read) {
       HULLD_RETURN_IF_ERROR(LookUp(locked, read, known.due_.back()));
       due.is_due = false;
       known.due_.pop_back();
-    } else if (!known.ahead_.empty()) {
-      EndAllLoading(locked, read);
     } else {
       return absl::OkStatus();
     }
@@ -142,15 +128,25 @@ absl::Status HullReader::LookUp(Locked& locked, const HullsRead& read, uint32_t 
       }
       if (!plan.may_wait) return WouldWait();
       HULLD_RETURN_IF_ERROR(CheckReaders(locked, read.known));
-      const absl::Status loaded = AwaitPoints(locked, read, k, *hull, was_missing);
-      if (!loaded.ok()) return NoteFailure(loaded, known);
+      absl::Status loaded;
+      if (was_missing) {
+        loaded = LoadOne(locked, *hull, read.should_stop);
+      } else {
+        // Loads the hulls due next, too.
+        ++state_.statistics.misses;
+        was_missing = true;
+        LoadMany(locked, read);
+      }
+      if (Stopped(read.should_stop)) return Cancelled();
+      if (!loaded.ok() && !hull->state.gone()) return NoteFailure(loaded, known);
       continue;
     }
     const bool prepare = hull->WantsPreparing(plan.expected_questions);
     if (prepare && plan.prepare_first) {
       if (!plan.may_wait) return WouldWait();
       if (!std::exchange(known.is_prepared, true)) {
-        HULLD_RETURN_IF_ERROR(PrepareFirst(locked, read, *hull));
+        state_.Prepare(locked, *hull);
+        if (Stopped(read.should_stop)) return Cancelled();
         continue;
       }
     }
@@ -171,11 +167,7 @@ absl::Status HullReader::NoteFailure(const absl::Status& status, KnownHulls::Kno
 // Loads the records of this hull and of some hulls due next. The caller must look the hull up again
 // unless the read failed. Releases the mutex.
 absl::Status HullReader::AwaitRecord(Locked& locked, const HullsRead& read, uint32_t k) {
-  KnownHulls& hulls = read.known;
-  if (!hulls.ahead_.empty()) {
-    EndAllLoading(locked, read);
-    return absl::OkStatus();
-  }
+  const KnownHulls& hulls = read.known;
   std::vector<const std::string*> wanted = {&read.ids[hulls.hulls_[k].first]};
   const size_t count = std::min<size_t>(hulls.due_.size(), kMaxLookupsPerHold - 1);
   for (const uint32_t due : std::span(hulls.due_).last(count)) {
@@ -183,33 +175,6 @@ absl::Status HullReader::AwaitRecord(Locked& locked, const HullsRead& read, uint
   }
   const absl::Status asked = records_.AwaitKnown(locked, wanted, read.should_stop);
   return Stopped(read.should_stop) ? Cancelled() : asked;
-}
-
-// Loads the points of this hull, and at first of the hulls due next. As AwaitRecord otherwise.
-absl::Status HullReader::AwaitPoints(Locked& locked, const HullsRead& read, uint32_t k,
-                                     RegisteredHull& hull, bool& was_missing) {
-  absl::Status loaded;
-  if (!std::exchange(was_missing, true)) {
-    ++state_.statistics.misses;
-    LoadMany(locked, read, k);
-  } else if (!read.known.ahead_.empty()) {
-    EndAllLoading(locked, read);
-    return absl::OkStatus();
-  } else {
-    loaded = LoadOne(locked, hull, read.should_stop);
-  }
-  if (Stopped(read.should_stop)) return Cancelled();
-  return hull.state.gone() ? absl::OkStatus() : loaded;
-}
-
-// Prepares the hull before its first query. Releases the mutex.
-absl::Status HullReader::PrepareFirst(Locked& locked, const HullsRead& read, RegisteredHull& hull) {
-  if (!read.known.ahead_.empty()) {
-    EndAllLoading(locked, read);
-    if (!hull.WantsPreparing(read.plan.expected_questions)) return absl::OkStatus();
-  }
-  state_.Prepare(locked, hull);
-  return Stopped(read.should_stop) ? Cancelled() : absl::OkStatus();
 }
 
 // Returns true if this reader already has the committed state of the hull.
@@ -233,91 +198,56 @@ void HullReader::NoteView(Locked& locked, const HullPointer& hull, KnownHulls& h
   }
 }
 
-// Loads the missing points of this hull and of the hulls due next, on several threads, except hulls
-// that another reader is loading. While these hulls are looked up, threads load the next ones. A
-// read finishes its own loads before it waits for another reader, which may wait for them. Releases
-// the mutex. Points that cannot be read, or that a writer superseded, stay missing.
-void HullReader::LoadMany(Locked& locked, const HullsRead& read, uint32_t k) {
-  KnownHulls& hulls = read.known;
-  const bool& is_ahead = hulls.hulls_[k].is_ahead;
-  if (!is_ahead) hulls.ahead_end_ = hulls.due_.size();
-  while (hulls.ahead_.size() < 2 && BeginLoading(locked, read)) continue;
-  while (is_ahead) EndLoading(locked, read);
-}
-
-// Starts a load if enough hulls are missing. Returns false if not.
-bool HullReader::BeginLoading(Locked& locked, const HullsRead& read) {
+// Loads the missing points of the hulls due next, on several threads, if there are at least two,
+// except hulls that another reader is loading. Releases the mutex. Points that cannot be read, or
+// that a writer superseded, stay missing.
+void HullReader::LoadMany(Locked& locked, const HullsRead& read) {
+  // A choice: many lookups, so that threads are seldom started.
+  constexpr size_t kMaxHulls = 4 * kMaxLookupsPerHold;
   KnownHulls& hulls = read.known;
   // At about 200 bytes per point, a twentieth of the memory limit: the readers' share is not
   // checked until each hull is looked up.
-  uint64_t max_points = std::min<uint64_t>(1 << 17, state_.limits.memory_limit / 4096);
-  // Two jobs, so that the second loads while the hulls of the first are looked up.
-  const uint64_t enough_points = max_points / 2;
-  for (const KnownHulls::Loading& loading : hulls.ahead_) {
-    max_points -= std::min(max_points, loading.points);
-  }
-  if (locked.lookups() > 0) locked.Yield();
-  KnownHulls::Loading next;
+  const uint64_t max_points = std::min<uint64_t>(1 << 17, state_.limits.memory_limit / 4096);
+  std::vector<KnownHulls::Known*> chosen;
   std::vector<StoredHull> stored;
+  uint64_t points = 0;
   // due_ is processed from the back.
-  size_t& end = hulls.ahead_end_;
-  end = std::min(end, hulls.due_.size());
-  for (uint64_t looked_at = 1; end > 0 && looked_at < kMaxLookupsPerHold; ++looked_at) {
-    const uint32_t k = hulls.due_[end - 1];
+  for (size_t n = 0; n < std::min(hulls.due_.size(), kMaxHulls); ++n) {
+    if (locked.lookups() >= kMaxLookupsPerHold) locked.Yield();
     locked.NoteLookup();
-    const KnownHulls::Known& known = hulls.hulls_[k];
+    KnownHulls::Known& known = hulls.hulls_[hulls.due_[hulls.due_.size() - 1 - n]];
     const std::string& id = read.ids[known.first];
     const HullPointer hull = state_.IsKnown(id) ? state_.FindVisible(id) : nullptr;
     if (hull == nullptr || hull->state.damaged() || hull->IsReady() || hull->is_loading() ||
         hull->state.life() == HullState::Life::kEnding || IsHeld(known, *hull)) {
-      --end;
       continue;
     }
     const VertexLayout& layout = hull->committed().layout;
-    const uint64_t points = next.points + layout.base_vertices + layout.delta_vertices;
-    if (points > max_points || (points > enough_points && next.hulls.size() > 1)) break;
-    --end;
-    next.points = points;
-    next.found.push_back(hull);
-    next.hulls.push_back(k);
+    points += layout.base_vertices + layout.delta_vertices;
+    if (points > max_points) break;
+    hull->StartLoading();
+    known.found = hull;
+    chosen.push_back(&known);
     stored.push_back(hull->committed());
   }
-  if (next.hulls.size() < 2) return false;
-  for (size_t i = 0; i < next.hulls.size(); ++i) {
-    next.found[i]->StartLoading();
-    hulls.hulls_[next.hulls[i]].is_ahead = true;
-  }
-  next.job = std::make_shared<LoadJob>(state_.store, std::move(stored), loaders_);
-  hulls.ahead_.push_back(std::move(next));
-  return true;
-}
-
-// Waits for the first job and installs its hulls.
-void HullReader::EndLoading(Locked& locked, const HullsRead& read) {
-  KnownHulls& hulls = read.known;
-  const KnownHulls::Loading loading = std::move(hulls.ahead_.front());
-  hulls.ahead_.erase(hulls.ahead_.begin());
+  // LoadOne reports the error of a single hull.
+  if (chosen.size() == 1) chosen.front()->found->EndLoading();
+  if (chosen.size() < 2) return;
   locked.Unlock();
-  std::vector<LoadJob::Loaded> loaded = loading.job->Finish(read.should_stop);
+  std::vector<LoadedHull> loaded = LoadEach(state_.store, stored, loaders_, read.should_stop);
   locked.Lock();
-  for (size_t i = 0; i < loading.hulls.size(); ++i) {
-    KnownHulls::Known& known = hulls.hulls_[loading.hulls[i]];
-    RegisteredHull& hull = *loading.found[i];
-    known.is_ahead = false;
+  for (size_t i = 0; i < chosen.size(); ++i) {
+    if (locked.lookups() >= kMaxLookupsPerHold) locked.Yield();
+    locked.NoteLookup();
+    RegisteredHull& hull = *chosen[i]->found;
     hull.EndLoading();
-    const uint64_t revision = loading.job->hulls()[i].record.revision;
-    const bool is_current = hull.committed().record.revision == revision;
+    const bool is_current = hull.committed().record.revision == stored[i].record.revision;
     if (!loaded[i].ok() || !is_current || hull.live() != nullptr || hull.state.gone()) continue;
     hull.SetLive(*std::move(loaded[i]));
     ++state_.statistics.loads;
     hull.NoteUse();
-    known.is_loaded = true;
-    known.found = loading.found[i];
+    chosen[i]->is_loaded = true;
   }
-}
-
-void HullReader::EndAllLoading(Locked& locked, const HullsRead& read) {
-  while (!read.known.ahead_.empty()) EndLoading(locked, read);
 }
 
 absl::StatusOr<Resolved> HullReader::Refresh(std::span<const std::string> ids, KnownHulls& known,
@@ -336,7 +266,11 @@ absl::StatusOr<Resolved> HullReader::Refresh(std::span<const std::string> ids, K
     }
     if (!staleness.ok()) return staleness.status();
     resolved.as_of.staleness = *staleness;
-    HULLD_RETURN_IF_ERROR(LookUpDue(locked, {ids, known, should_stop, plan}));
+    const absl::Status found = LookUpAll(locked, {ids, known, should_stop, plan});
+    if (!found.ok()) {
+      for (const uint32_t k : known.due_) known.hulls_[k].found = nullptr;
+      return found;
+    }
     resolved.as_of.revision = state_.revision();
     if (plan.may_wait) state_.memory.Evict(locked);
   }
@@ -379,13 +313,9 @@ absl::Status HullReader::LoadOne(Locked& locked, RegisteredHull& hull,
     if (hull.state.damaged()) return hull.state.damage();
     const bool is_ending = hull.state.life() == HullState::Life::kEnding;
     if (hull.is_loading() || (failed && is_ending)) {
-      // Runs the deferred tasks before waiting.
-      locked.Yield();
-      const auto may_go_on = [&] {
+      HULLD_RETURN_IF_ERROR(locked.Await(hull.changed, should_stop, [&] {
         return !hull.is_loading() && !(failed && hull.state.life() == HullState::Life::kEnding);
-      };
-      locked.WaitOn([&](auto& lock) { hull.changed.wait_for(lock, kStopPoll, may_go_on); });
-      if (Stopped(should_stop)) return Cancelled();
+      }));
       continue;
     }
     hull.StartLoading();

@@ -30,9 +30,8 @@ namespace hulld::server {
 //
 // A read waits only for the store: for the record of an unknown hull (RecordReader), and for points
 // that are not in memory. One reader loads a hull for all that request it
-// (RegisteredHull::is_loading). For a read of many hulls, other threads load the next hulls while
-// the first are looked up. A read finishes all of its own loads before it waits for another read,
-// because that one may be waiting for them.
+// (RegisteredHull::is_loading). Other threads help a read that loads many hulls. A read finishes
+// its own loads before it waits for another read, because that one may be waiting for them.
 //
 // Guarded by the registry's mutex, which this class acquires, and releases to wait and to prepare.
 class HullReader {
@@ -62,24 +61,17 @@ class HullReader {
  private:
   struct HullsRead;
 
-  absl::Status LookUpDue(Locked& locked, const HullsRead& read);
   absl::Status LookUpAll(Locked& locked, const HullsRead& read);
   size_t FindAhead(const HullsRead& read);
   absl::Status LookUp(Locked& locked, const HullsRead& read, uint32_t k);
   static absl::Status NoteFailure(const absl::Status& status, KnownHulls::Known& known);
   absl::Status AwaitRecord(Locked& locked, const HullsRead& read, uint32_t k);
-  absl::Status AwaitPoints(Locked& locked, const HullsRead& read, uint32_t k, RegisteredHull& hull,
-                           bool& was_missing);
-  absl::Status PrepareFirst(Locked& locked, const HullsRead& read, RegisteredHull& hull);
   static bool IsHeld(const KnownHulls::Known& known, const RegisteredHull& hull);
   void NoteView(Locked& locked, const HullPointer& hull, KnownHulls& hulls, uint32_t k,
                 bool was_missing);
   absl::Status CheckReaders(Locked& locked, const KnownHulls& known);
 
-  void LoadMany(Locked& locked, const HullsRead& read, uint32_t k);
-  bool BeginLoading(Locked& locked, const HullsRead& read);
-  void EndLoading(Locked& locked, const HullsRead& read);
-  void EndAllLoading(Locked& locked, const HullsRead& read);
+  void LoadMany(Locked& locked, const HullsRead& read);
   absl::Status LoadOne(Locked& locked, RegisteredHull& hull,
                        const std::function<bool()>& should_stop);
 

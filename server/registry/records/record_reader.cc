@@ -35,16 +35,17 @@ absl::Status IsAhead(uint64_t found, uint64_t known) {
 
 }  // namespace
 
-void RecordReader::WhenKnown(Locked& locked, const std::string& id, Refusal refuse,
-                             LockedTask next) {
-  HULLD_CHECK(locked.Holds(state_.mutex) && !state_.IsKnown(id));
+std::pair<std::shared_ptr<RecordReader::Reading>, bool> RecordReader::Join(const std::string& id) {
   std::shared_ptr<Reading>& reading = readings_[id];
   const bool is_new = reading == nullptr;
-  if (is_new) {
-    reading = std::make_shared<Reading>();
-    reading->id = id;
-  }
-  reading->waiting.emplace_back(std::move(refuse), std::move(next));
+  if (is_new) reading = std::make_shared<Reading>(Reading{id, {}});
+  return {reading, is_new};
+}
+
+void RecordReader::WhenKnown(const std::string& id, Committer::Barrier done) {
+  HULLD_CHECK(!state_.IsKnown(id));
+  const auto [reading, is_new] = Join(id);
+  reading->waiting.push_back(std::move(done));
   if (!is_new) return;
   due_.push_back(reading);
   if (threads_ == kMaxThreads) return;
@@ -60,26 +61,16 @@ void RecordReader::WhenReady(const std::string& id, For need, Refusal refuse, Ta
 
 void RecordReader::RunWhenReady(Locked& locked, const std::shared_ptr<const ReadyTask>& ready) {
   const LockedTask again = [this, ready](Locked& later) { RunWhenReady(later, ready); };
-  if (MustWait(locked, ready->id, ready->need, ready->refuse, again)) return;
+  const std::string& id = ready->id;
+  if (!state_.IsKnown(id)) return WhenKnown(id, ReadBarrier::RunOrRefuse(ready->refuse, again));
+  BodyTable::Entry* const body = state_.bodies.Find(id);
+  if (body != nullptr && body->in_flight) return body->waiting.push_back(again);
+  if (const HullPointer hull = state_.Find(id); hull != nullptr) {
+    const HullState& state = hull->state;
+    const bool waits = ready->need == For::kQuiet ? !state.quiet() : state.changing_life();
+    if (waits) return hull->exclusive.push_back(again);
+  }
   ready->task(locked, again);
-}
-
-bool RecordReader::MustWait(Locked& locked, const std::string& id, For need, const Refusal& refuse,
-                            LockedTask next) {
-  if (!state_.IsKnown(id)) {
-    WhenKnown(locked, id, refuse, std::move(next));
-    return true;
-  }
-  if (BodyTable::Entry* const body = state_.bodies.Find(id); body != nullptr && body->in_flight) {
-    body->waiting.push_back(std::move(next));
-    return true;
-  }
-  const HullPointer hull = state_.Find(id);
-  if (hull == nullptr) return false;
-  const HullState& state = hull->state;
-  const bool waits = need == For::kQuiet ? !state.quiet() : state.changing_life();
-  if (waits) hull->exclusive.push_back(std::move(next));
-  return waits;
 }
 
 // Sends one query; IDs that arrive during it go into the next one. The thread is offered to other
@@ -113,23 +104,18 @@ absl::Status RecordReader::AwaitKnown(Locked& locked, std::span<const std::strin
       if (awaited == nullptr) return absl::OkStatus();
       continue;
     }
-    std::shared_ptr<Reading>& reading = readings_[*id];
-    if (reading == nullptr) {
-      reading = std::make_shared<Reading>();
-      reading->id = *id;
-      own.push_back(reading);
-    }
+    const auto [reading, is_new] = Join(*id);
+    if (is_new) own.push_back(reading);
     if (awaited == nullptr) awaited = reading;
   }
-  if (!own.empty()) ReadRecords(locked, own);
-  const auto is_over = [&] { return awaited->is_over; };
-  while (!is_over()) {
-    if (Stopped(should_stop)) return Cancelled();
-    locked.WaitOn([&](auto& lock) { awaited->over.wait_for(lock, kStopPoll, is_over); });
-  }
-  return awaited->status;
+  return locked.AwaitResult<absl::Status>(should_stop, [&](const auto& done) {
+    awaited->waiting.push_back([done](Locked&, const absl::Status& s) { done(s); });
+    if (!own.empty()) ReadRecords(locked, own);
+  });
 }
 
+// As AwaitKnown for the unknown ones among `ids`, which must include the first.
+// RESOURCE_EXHAUSTED: readers exceed their share of --memory-limit.
 absl::Status RecordReader::AwaitMissing(Locked& locked, std::span<const std::string> ids,
                                         const std::function<bool()>& should_stop) {
   HULLD_RETURN_IF_ERROR(state_.memory.Check(locked, MemoryUse::kReading));
@@ -140,6 +126,30 @@ absl::Status RecordReader::AwaitMissing(Locked& locked, std::span<const std::str
   const absl::Status read = AwaitKnown(locked, missing, should_stop);
   if (Stopped(should_stop)) return Cancelled();
   return read;
+}
+
+// Looks up kMaxLookupsPerHold bodies per hold and reads the unknown ones together. A reader of
+// many bodies may evict them again, so bodies already found are not looked up again.
+FoundBodies RecordReader::FindBodies(std::span<const std::string> ids,
+                                     const std::function<bool()>& should_stop, bool may_wait) {
+  Locked locked(state_.mutex);
+  FoundBodies found;
+  found.bodies.resize(ids.size());
+  for (size_t first = 0; first < ids.size(); first += kMaxLookupsPerHold) {
+    if (first > 0) locked.Yield();
+    const size_t end = std::min<size_t>(first + kMaxLookupsPerHold, ids.size());
+    for (size_t i = first; i < end; ++i) {
+      while (found.status.ok() && !state_.IsKnown(ids[i])) {
+        found.status =
+            may_wait ? AwaitMissing(locked, ids.subspan(i, end - i), should_stop) : WouldWait();
+      }
+      // A body that could not be read may be known by now.
+      found.bodies[i] = state_.FindBody(ids[i]);
+      locked.NoteLookup();
+    }
+  }
+  found.store_revision = state_.revision();
+  return found;
 }
 
 // Releases the mutex during the read. The readings may end later than this call.
@@ -164,11 +174,15 @@ void RecordReader::TakeRecords(Locked& locked, const Readings& readings,
   state_.bodies.DropSome(locked);
   Readings open;
   for (const auto& reading : readings) {
-    if (reading->is_over) continue;
+    const auto current = readings_.find(reading->id);
+    if (current == readings_.end() || current->second != reading) continue;
     if (found.ok()) TakeRecord(locked, reading->id, *found);
+    readings_.erase(current);
     open.push_back(reading);
   }
-  for (const auto& reading : open) EndReading(locked, *reading, found.status());
+  for (const auto& reading : open) {
+    for (const Committer::Barrier& done : reading->waiting) done(locked, found.status());
+  }
 }
 
 void RecordReader::TakeRecord(Locked& locked, const std::string& id, const FoundRecords& found) {
@@ -183,36 +197,21 @@ void RecordReader::TakeRecord(Locked& locked, const std::string& id, const Found
   state_.AddStored(id, hull->second);
 }
 
-void RecordReader::EndReading(Locked& locked, Reading& reading, const absl::Status& status) {
-  reading.is_over = true;
-  reading.status = status;
-  reading.over.notify_all();
-  readings_.erase(reading.id);
-  for (auto& [refuse, next] : std::exchange(reading.waiting, {})) {
-    if (status.ok()) {
-      next(locked);
-    } else {
-      locked.Afterwards([refuse = std::move(refuse), status] { refuse(status); });
-    }
-  }
-}
-
 void RecordReader::OnPeerChange(Locked& /*locked*/, const std::string& id,
                                 const HullPointer& /*hull*/) {
   const auto found = readings_.find(id);
   if (found == readings_.end()) return;
-  const std::shared_ptr<Reading> reading = found->second;
   if (!state_.IsKnown(id)) state_.hulls.NoteAbsent(id);
-  reading->is_over = true;
-  reading->over.notify_all();
+  for (Committer::Barrier& done : found->second->waiting) {
+    barrier_.Defer([done = std::move(done)](Locked& later) { done(later, absl::OkStatus()); });
+  }
   readings_.erase(found);
-  for (auto& [refuse, next] : std::exchange(reading->waiting, {})) barrier_.Defer(std::move(next));
 }
 
 void RecordReader::WhenReached(Locked& locked, uint64_t asked_at,
                                absl::StatusOr<FoundRecords> found, FoundTaker take) {
   if (found.ok() && found->revision < asked_at) found = WentBack(found->revision, asked_at);
-  if (!found.ok() || !IsBehind(*found, nullptr)) return take(locked, found);
+  if (!found.ok() || !IsBehind(*found)) return take(locked, found);
   // After this round of the committer, the registry includes everything that the store contained.
   const auto kept = std::make_shared<const FoundRecords>(*std::move(found));
   committer_.AddBarrier(
@@ -222,19 +221,6 @@ void RecordReader::WhenReached(Locked& locked, uint64_t asked_at,
         if (kept->revision > known) return take(later, IsAhead(kept->revision, known));
         take(later, *kept);
       });
-}
-
-absl::StatusOr<FoundRecords> RecordReader::AwaitReached(uint64_t asked_at,
-                                                        absl::StatusOr<FoundRecords> found,
-                                                        const std::function<bool()>& should_stop) {
-  if (!found.ok()) return found;
-  if (found->revision < asked_at) return WentBack(found->revision, asked_at);
-  Locked locked(state_.mutex);
-  if (!IsBehind(*found, &locked)) return found;
-  HULLD_RETURN_IF_ERROR(barrier_.AwaitCommits(locked, should_stop));
-  const uint64_t known = state_.revision();
-  if (found->revision > known) return IsAhead(found->revision, known);
-  return found;
 }
 
 // Returns true if the store has a later state of the hull than the registry, at the same revision:
@@ -249,32 +235,44 @@ bool RecordReader::IsBehind(const std::string& id, const absl::StatusOr<StoredHu
 
 // Returns true if the records are newer than the registry: committed, perhaps by a peer server, but
 // not yet applied. An answer from them would be followed by an older one from memory.
-bool RecordReader::IsBehind(const FoundRecords& found, Locked* yields) const {
-  if (found.revision > state_.revision()) return true;
-  return std::ranges::any_of(found.hulls, [&](const auto& hull) {
-    if (yields != nullptr) yields->NoteLookupMaybeYield();
-    return IsBehind(hull.first, hull.second);
-  });
+bool RecordReader::IsBehind(const FoundRecords& found) const {
+  return found.revision > state_.revision() ||
+         std::ranges::any_of(found.hulls,
+                             [&](const auto& hull) { return IsBehind(hull.first, hull.second); });
 }
 
-absl::StatusOr<RecordPage> RecordReader::List(const PageRequest& request,
-                                              const std::function<bool()>& should_stop) {
-  uint64_t asked_at = 0;
-  {
-    Locked locked(state_.mutex);
-    if (!state_.is_cache()) return CataloguedPage(request);
-    asked_at = state_.revision();
-    const absl::Status memory =
-        request.kinds.bodies ? state_.memory.Check(locked, MemoryUse::kReading) : absl::OkStatus();
-    if (!memory.ok()) return memory;
-  }
-  HULLD_ASSIGN_OR_RETURN(const FoundRecords found,
-                         AwaitReached(asked_at,
-                                      state_.store.ListRecords(request.prefix, request.after,
-                                                               request.page_size, request.kinds),
-                                      should_stop));
+absl::StatusOr<FoundRecords> RecordReader::Query(const PageRequest& request) {
+  absl::StatusOr<FoundRecords> found =
+      request.ids.empty() ? state_.store.ListRecords(request.prefix, request.after,
+                                                     request.page_size, request.kinds)
+                          : state_.store.FindRecords(request.ids);
+  if (found.ok() && !request.kinds.bodies) found->bodies.clear();
+  return found;
+}
+
+absl::StatusOr<RecordPage> RecordReader::List(std::string prefix, std::string after,
+                                              size_t page_size,
+                                              const std::function<bool()>& should_stop,
+                                              RecordKinds kinds) {
+  const PageRequest request = {.prefix = std::move(prefix),
+                               .kinds = kinds,
+                               .after = std::move(after),
+                               .page_size = page_size};
   Locked locked(state_.mutex);
-  return Describe(found, &locked);
+  if (!state_.is_cache()) return CataloguedPage(request);
+  if (request.kinds.bodies) {
+    HULLD_RETURN_IF_ERROR(state_.memory.Check(locked, MemoryUse::kReading));
+  }
+  const uint64_t asked_at = state_.revision();
+  locked.Unlock();
+  absl::StatusOr<FoundRecords> found = Query(request);
+  locked.Lock();
+  return locked.AwaitResult<absl::StatusOr<RecordPage>>(should_stop, [&](const auto& done) {
+    WhenReached(locked, asked_at, std::move(found),
+                [this, done](Locked&, const absl::StatusOr<FoundRecords>& reached) {
+                  done(Describe(reached));
+                });
+  });
 }
 
 // The registry may know more about this version than its record: its box, or its damage.
@@ -294,13 +292,11 @@ HullChange RecordReader::Describe(const std::string& id,
   return described.record == change.record ? described : change;
 }
 
-RecordPage RecordReader::Describe(const FoundRecords& found, Locked* yields) const {
-  RecordPage page = {.store_revision = found.revision, .more = found.more};
-  for (const auto& [id, stored] : found.hulls) {
-    if (yields != nullptr) yields->NoteLookupMaybeYield();
-    page.entries.push_back(Describe(id, stored));
-  }
-  for (const auto& [id, stored] : found.bodies) {
+absl::StatusOr<RecordPage> RecordReader::Describe(const absl::StatusOr<FoundRecords>& found) const {
+  if (!found.ok()) return found.status();
+  RecordPage page = {.store_revision = found->revision, .more = found->more};
+  for (const auto& [id, stored] : found->hulls) page.entries.push_back(Describe(id, stored));
+  for (const auto& [id, stored] : found->bodies) {
     const StoredBody nothing = {{id, 0, 0}, {}, {}};
     page.entries.push_back(Body::Describe(stored.ok() ? *stored : nothing, stored.status()));
   }
@@ -351,17 +347,12 @@ void RecordReader::ReadPage(Locked& locked, PageRequest request,
   loaders_.Submit(
       [this, request = std::move(request), done = std::move(done),
        asked_at = state_.revision()]() mutable {
-        absl::StatusOr<FoundRecords> found =
-            request.ids.empty() ? state_.store.ListRecords(request.prefix, request.after,
-                                                           request.page_size, request.kinds)
-                                : state_.store.FindRecords(request.ids);
-        if (found.ok() && !request.kinds.bodies) found->bodies.clear();
+        absl::StatusOr<FoundRecords> found = Query(request);
         Locked later(state_.mutex);
         WhenReached(later, asked_at, std::move(found),
                     [this, done = std::move(done)](Locked& now,
                                                    const absl::StatusOr<FoundRecords>& reached) {
-                      if (!reached.ok()) return done(now, reached.status());
-                      done(now, Describe(*reached, nullptr));
+                      done(now, Describe(reached));
                     });
       },
       kWatchReader);

@@ -14,13 +14,12 @@
 #include <vector>
 
 #include "server/process/fair_queue.h"
-#include "server/process/synchronization.h"
 #include "server/process/task_pool.h"
 #include "server/registry/commit/committer.h"
 #include "server/registry/memory/locked.h"
 #include "server/registry/peers/read_barrier.h"
 #include "server/registry/state/registry_state.h"
-#include "server/registry/watch/change_watch.h"
+#include "server/registry/watch/change_feed.h"
 #include "server/store/store.h"
 
 namespace hulld::server {
@@ -55,10 +54,6 @@ class RecordReader : public PeerChangeListener, public PageSource {
   RecordReader(const RecordReader&) = delete;
   RecordReader& operator=(const RecordReader&) = delete;
 
-  // Reads the record of an ID, then runs `next`, which must check again that the ID is known; or
-  // refuses, without the mutex. Requires: the ID is unknown.
-  void WhenKnown(Locked& locked, const std::string& id, Refusal refuse, LockedTask next);
-
   // State of an ID that a task requires. kLife: known, with no change of a body and no creation or
   // end of a hull in flight. kQuiet: known, with nothing in flight.
   enum class For { kLife, kQuiet };
@@ -66,40 +61,38 @@ class RecordReader : public PeerChangeListener, public PageSource {
   // state; or refuses, without the mutex. The task may run again by `again`, which waits likewise.
   using Task = std::function<void(Locked& locked, const LockedTask& again)>;
   void WhenReady(const std::string& id, For need, Refusal refuse, Task task);
-  // Returns true if the ID is not in that state; then `next` runs when it may have reached that
-  // state, and must check again. Otherwise does nothing. refuse: as WhenKnown.
-  bool MustWait(Locked& locked, const std::string& id, For need, const Refusal& refuse,
-                LockedTask next);
 
   // Blocks until the first ID is known; also reads up to kMaxLookupsPerHold pending IDs. Releases
   // the mutex. Returns the error of the read, or CANCELLED if should_stop, which may be empty,
   // returned true. OK: the ID was known at some time since. Requires at least one ID.
   absl::Status AwaitKnown(Locked& locked, std::span<const std::string* const> ids,
                           const std::function<bool()>& should_stop);
-  // As AwaitKnown for the unknown ones among `ids`, which must include the first.
-  // RESOURCE_EXHAUSTED: readers exceed their share of --memory-limit.
-  absl::Status AwaitMissing(Locked& locked, std::span<const std::string> ids,
-                            const std::function<bool()>& should_stop);
+  // Loads unknown records from the store, so it must not run on a gRPC thread. Status: UNAVAILABLE:
+  // the store cannot be read; CANCELLED: should_stop returned true; RESOURCE_EXHAUSTED: a read is
+  // needed, and readers exceed their share of --memory-limit. Cost: O(log n) each, and one store
+  // query per kMaxLookupsPerHold; the mutex is released in between. may_wait: as in ReadPlan.
+  FoundBodies FindBodies(std::span<const std::string> ids,
+                         const std::function<bool()>& should_stop = {}, bool may_wait = true);
 
   // Ends the read of the ID; its tasks look the ID up again.
   void OnPeerChange(Locked& locked, const std::string& id, const HullPointer& hull) override;
 
-  // As Registry::List, for a request by prefix. May query the store on this thread. Requires that
-  // the thread does not hold the mutex (not checked: a mutex does not know its holder).
-  absl::StatusOr<RecordPage> List(const PageRequest& request,
-                                  const std::function<bool()>& should_stop);
+  // Returns at most `page_size` hulls, or bodies, or both, with IDs that start with `prefix` and
+  // follow `after` in byte order; a page of bodies may contain fewer even if more follow. If the
+  // store finds records, queries the store, and must not run on a gRPC thread. UNAVAILABLE: the
+  // store cannot be read. CANCELLED: should_stop returned true.
+  absl::StatusOr<RecordPage> List(std::string prefix, std::string after, size_t page_size,
+                                  const std::function<bool()>& should_stop = {},
+                                  RecordKinds kinds = {.hulls = true});
 
   void ReadPage(Locked& locked, PageRequest request,
                 std::function<void(Locked&, absl::StatusOr<RecordPage>)> done) override;
 
  private:
+  // A read of a record. Its callers wait for the registry's mutex, with the error of the read.
   struct Reading {
     std::string id;
-    bool is_over = false;
-    // Error of the read.
-    absl::Status status;
-    ConditionVariable over;
-    std::vector<std::pair<Refusal, LockedTask>> waiting;
+    std::vector<Committer::Barrier> waiting;
   };
   // Arguments of WhenReady.
   struct ReadyTask {
@@ -112,29 +105,32 @@ class RecordReader : public PeerChangeListener, public PageSource {
   // Called with the registry's mutex held, with the records valid from then on, or an error.
   using FoundTaker = std::function<void(Locked&, const absl::StatusOr<FoundRecords>&)>;
 
+  // Returns the read of the record of an ID, and true if it is new.
+  std::pair<std::shared_ptr<Reading>, bool> Join(const std::string& id);
+  // Reads the record of an ID, then calls `done`, which must check again that the ID is known.
+  // Requires: the ID is unknown.
+  void WhenKnown(const std::string& id, Committer::Barrier done);
+  absl::Status AwaitMissing(Locked& locked, std::span<const std::string> ids,
+                            const std::function<bool()>& should_stop);
   void RunWhenReady(Locked& locked, const std::shared_ptr<const ReadyTask>& ready);
   void ReadDue();
   void ReadRecords(Locked& locked, const Readings& readings);
   void TakeRecords(Locked& locked, const Readings& readings,
                    const absl::StatusOr<FoundRecords>& found);
   void TakeRecord(Locked& locked, const std::string& id, const FoundRecords& found);
-  void EndReading(Locked& locked, Reading& reading, const absl::Status& status);
 
   // Passes `found` to `take`, now or on the committer's thread. asked_at: the registry's revision
   // at the time of the store query. UNAVAILABLE: the store went back, or cannot report the changes
   // in between.
   void WhenReached(Locked& locked, uint64_t asked_at, absl::StatusOr<FoundRecords> found,
                    FoundTaker take);
-  // As WhenReached, but blocks. Requires that the thread does not hold the mutex. CANCELLED:
-  // should_stop returned true.
-  absl::StatusOr<FoundRecords> AwaitReached(uint64_t asked_at, absl::StatusOr<FoundRecords> found,
-                                            const std::function<bool()>& should_stop);
   bool IsBehind(const std::string& id, const absl::StatusOr<StoredHull>& stored) const;
-  // yields, here and below: if not null, the mutex may be released between lookups.
-  bool IsBehind(const FoundRecords& found, Locked* yields) const;
+  bool IsBehind(const FoundRecords& found) const;
 
+  // Queries the store for a page.
+  absl::StatusOr<FoundRecords> Query(const PageRequest& request);
   HullChange Describe(const std::string& id, const absl::StatusOr<StoredHull>& stored) const;
-  RecordPage Describe(const FoundRecords& found, Locked* yields) const;
+  absl::StatusOr<RecordPage> Describe(const absl::StatusOr<FoundRecords>& found) const;
   RecordPage CataloguedPage(const PageRequest& request) const;
 
   RegistryState& state_;

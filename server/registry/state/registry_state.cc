@@ -85,6 +85,12 @@ absl::Status RegistryState::NoSuchHull(const std::string& id) const {
       v1::ERROR_REASON_HULL_NOT_FOUND, {{"hull_id", id}});
 }
 
+absl::Status RegistryState::NoSuchBody(const std::string& id) const {
+  if (!hulls.contains(id)) return BodyNotFound(id);
+  return WithReason(absl::NotFoundError(absl::StrCat("\"", id, "\" is a hull, not a body")),
+                    v1::ERROR_REASON_BODY_NOT_FOUND, {{"body_id", id}});
+}
+
 void RegistryState::AddStored(const std::string& id, const absl::StatusOr<StoredHull>& stored) {
   if (stored.ok()) {
     hulls.AddResting(*stored);
@@ -198,7 +204,7 @@ void RegistryState::ApplyCreation(Locked& locked, const HullPointer& former,
   NoteVertices(0, stored.record.vertex_count);
   Publish(stored.record.revision);
   NoteChange(*hull);
-  feed.NoteHull(locked, replaced, hull);
+  feed.NotePresent(locked, replaced, hull, nullptr);
 }
 
 void RegistryState::ApplyDeletion(Locked& locked, const HullPointer& hull, uint64_t revision) {
@@ -220,7 +226,7 @@ void RegistryState::ApplyChunk(Locked& locked, const HullPointer& hull,
   if (after.revision != before.revision) {
     Publish(after.revision);
     NoteVertices(before.vertex_count, after.vertex_count);
-    feed.NoteHull(locked, Incarnation::Of(before), hull);
+    feed.NotePresent(locked, Incarnation::Of(before), hull, nullptr);
   }
   PrepareIfWorn(hull);
 }
@@ -234,7 +240,7 @@ void RegistryState::ApplyBody(Locked& locked, const std::string& id,
   recent_changes.Note(id);
   bodies.Set(locked, id, body);
   if (body != nullptr) {
-    feed.NoteBody(locked, former, body);
+    feed.NotePresent(locked, former, nullptr, body);
   } else {
     --kept_bodies_;
     feed.NoteDeleted(locked, id, *former, revision);
@@ -302,7 +308,7 @@ bool RegistryState::ApplyPeerVersion(Locked& locked, const HullPointer& hull,
   statistics.grown += grew;
   if (grew) PrepareIfWorn(hull);
   NoteChange(*hull);
-  if (is_new) feed.NoteHull(locked, Incarnation::Of(stored.record), hull);
+  if (is_new) feed.NotePresent(locked, Incarnation::Of(stored.record), hull, nullptr);
   return true;
 }
 
@@ -332,8 +338,9 @@ void RegistryState::Note(Locked& locked, const std::string& id, const PeerChange
                          const std::optional<Incarnation>& former) {
   const std::shared_ptr<const Body> body = FindBody(id);
   const HullPointer hull = change.hull.has_value() ? hulls.Find(id) : nullptr;
-  if (body != nullptr && body->damage().ok()) return feed.NoteBody(locked, former, body);
-  if (hull != nullptr && !hull->state.damaged()) return feed.NoteHull(locked, former, hull);
+  if (body != nullptr ? body->damage().ok() : hull != nullptr && !hull->state.damaged()) {
+    return feed.NotePresent(locked, former, hull, body);
+  }
   const bool has_ended =
       hull == nullptr && (body == nullptr || (former.has_value() && !former->is_body));
   if (has_ended && (former.has_value() || change.ended_at == change.revision)) {

@@ -14,7 +14,6 @@
 #include "server/process/metrics.h"
 #include "server/process/task_pool.h"
 #include "server/registry/catalog/body.h"
-#include "server/registry/catalog/body_table.h"
 #include "server/registry/catalog/hull_table.h"
 #include "server/registry/catalog/known_hulls.h"
 #include "server/registry/catalog/registry_types.h"
@@ -73,8 +72,9 @@ class RegistryState {
   // Returns the committed body; null if there is none. Requires IsKnown(id) (not checked: a body
   // whose read failed is unknown).
   std::shared_ptr<const Body> FindBody(const std::string& id);
-  // NOT_FOUND; if the ID belongs to a body, the message says so.
+  // NOT_FOUND; if the ID belongs to the other kind, the message says so.
   absl::Status NoSuchHull(const std::string& id) const;
+  absl::Status NoSuchBody(const std::string& id) const;
 
   // Adds a stored hull, at rest or as damaged. Requires: the hull table has no hull with the ID.
   void AddStored(const std::string& id, const absl::StatusOr<StoredHull>& stored);

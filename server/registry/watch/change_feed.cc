@@ -58,6 +58,43 @@ struct WatchGroup {
   uint64_t lost_revision = 0;
 };
 
+void DeletionLog::Add(const std::string& id, uint64_t revision, bool was_body) {
+  log_.push_back({revision, id, was_body});
+  Last last{revision, was_body ? 0 : revision};
+  if (const auto former = last_.find(id); former != last_.end()) {
+    if (was_body) last.hull_revision = former->second.hull_revision;
+    // The new key outlives the former one.
+    last_.erase(former);
+  }
+  last_.emplace(log_.back().id, last);
+  if (log_.size() <= kCapacity) return;
+  begin_ = log_.front().revision;
+  const auto first = last_.find(log_.front().id);
+  if (first != last_.end() && first->second.revision == begin_) last_.erase(first);
+  log_.pop_front();
+}
+
+void DeletionLog::NoteCreation(const std::string& id, bool is_body) {
+  const auto last = last_.find(id);
+  if (last == last_.end()) return;
+  if (is_body) {
+    last->second.is_body_now = true;
+  } else {
+    last_.erase(last);
+  }
+}
+
+std::deque<DeletionLog::Deletion>::const_iterator DeletionLog::After(uint64_t revision) const {
+  return std::ranges::upper_bound(log_, revision, {}, &Deletion::revision);
+}
+
+bool DeletionLog::IsFinal(const Deletion& deletion, bool bodies) const {
+  const auto last = last_.find(deletion.id);
+  if (last == last_.end()) return false;
+  if (!bodies) return deletion.revision == last->second.hull_revision;
+  return deletion.revision == last->second.revision && !last->second.is_body_now;
+}
+
 ChangeFeed::ChangeFeed(const Store& store, FairMutex& mutex, MemoryBudget& memory,
                        std::chrono::milliseconds mark_interval)
     : store_(store),
@@ -83,38 +120,23 @@ void ChangeFeed::Begin(uint64_t revision, PageSource& pages) {
   deletions_.Begin(revision);
 }
 
-void ChangeFeed::NoteHull(Locked& locked, const std::optional<Incarnation>& former,
-                          const HullPointer& hull) {
-  const HullRecord& record = hull->committed().record;
-  NotePresent(locked, record.hull_id, former,
-              {.is_body = false,
-               .revision = record.revision,
-               .create_revision = record.create_revision,
-               .hull = hull});
-}
-
-void ChangeFeed::NoteBody(Locked& locked, const std::optional<Incarnation>& former,
-                          const std::shared_ptr<const Body>& body) {
-  const BodyRecord& record = body->record();
-  NotePresent(locked, record.body_id, former,
-              {.is_body = true,
-               .revision = record.revision,
-               .create_revision = record.create_revision,
-               .body = body});
-}
-
-// Notes a change after which a hull or body has the ID.
-void ChangeFeed::NotePresent(Locked& locked, const std::string& id,
-                             const std::optional<Incarnation>& former, Change change) {
-  const Incarnation now = {change.create_revision, change.is_body};
+void ChangeFeed::NotePresent(Locked& locked, const std::optional<Incarnation>& former,
+                             const HullPointer& hull, const std::shared_ptr<const Body>& body) {
+  const HullRecord record = body != nullptr ? body->Describe().record : hull->committed().record;
+  const Incarnation now = {record.create_revision, body != nullptr};
+  Change change = {.is_body = now.is_body,
+                   .revision = record.revision,
+                   .create_revision = record.create_revision,
+                   .hull = hull,
+                   .body = body};
   change.kind = !former.has_value() ? ChangeKind::kCreated
                 : *former == now    ? ChangeKind::kChanged
                                     : ChangeKind::kReplaced;
   if (former.has_value() && former->is_body != now.is_body) {
     change.other_kind_began = former->create_revision;
-    deletions_.Add(id, change.revision, former->is_body);
+    deletions_.Add(record.hull_id, change.revision, former->is_body);
   }
-  Note(locked, id, change);
+  Note(locked, record.hull_id, change);
 }
 
 void ChangeFeed::NoteDeleted(Locked& locked, const std::string& id, const Incarnation& former,
@@ -147,7 +169,7 @@ void ChangeFeed::Note(Locked& locked, const std::string& id, const Change& chang
   revision_ = change.revision;
   if (change.kind != ChangeKind::kDeleted) deletions_.NoteCreation(id, change.is_body);
   const auto note_for = [&](const GroupsByName& groups, std::string_view name) {
-    const auto found = groups.find(name);
+    const auto found = groups.find(absl::string_view(name.data(), name.size()));
     if (found == groups.end()) return;
     for (const auto& group : found->second) {
       const std::optional<Change> reported = AsReportedTo(group->target, change);
@@ -209,7 +231,7 @@ std::shared_ptr<WatchGroup> ChangeFeed::GroupOf(const WatchTarget& target) {
   }
   const auto group = std::make_shared<WatchGroup>();
   group->target = target;
-  for (const std::string& id : target.ids) AddId(id, group);
+  for (const std::string& id : target.ids) by_id_[id].push_back(group);
   if (!target.ids.empty()) return group;
   by_prefix_[target.prefix].push_back(group);
   ++prefix_lengths_[target.prefix.size()];
@@ -226,10 +248,6 @@ void ChangeFeed::RemoveGroup(const std::shared_ptr<WatchGroup>& group) {
   if (found->second.empty()) by_prefix_.erase(found);
   const auto length = prefix_lengths_.find(target.prefix.size());
   if (--length->second == 0) prefix_lengths_.erase(length);
-}
-
-void ChangeFeed::AddId(const std::string& id, const std::shared_ptr<WatchGroup>& group) {
-  by_id_[id].push_back(group);
 }
 
 void ChangeFeed::RemoveId(const std::string& id, const std::shared_ptr<WatchGroup>& group) {
@@ -301,7 +319,7 @@ void ChangeFeed::ChangeIds(Watch& watch, std::span<const std::string> added,
   };
   in_slices(added, [&](const std::string& id) {
     HULLD_CHECK(group->target.ids.insert(id).second);
-    AddId(id, group);
+    by_id_[id].push_back(group);
   });
   in_slices(removed, [&](const std::string& id) {
     HULLD_CHECK(group->target.ids.erase(id) == 1);

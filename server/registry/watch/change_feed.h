@@ -1,15 +1,20 @@
 #ifndef HULLD_SERVER_REGISTRY_WATCH_CHANGE_FEED_H_
 #define HULLD_SERVER_REGISTRY_WATCH_CHANGE_FEED_H_
 
+#include <absl/container/flat_hash_map.h>
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <functional>
+#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <string_view>
@@ -18,13 +23,144 @@
 
 #include "server/process/synchronization.h"
 #include "server/registry/catalog/body.h"
+#include "server/registry/catalog/registry_types.h"
 #include "server/registry/memory/locked.h"
 #include "server/registry/memory/memory_budget.h"
-#include "server/registry/watch/change_watch.h"
-#include "server/registry/watch/deletion_log.h"
 #include "server/store/store.h"
 
 namespace hulld::server {
+
+// Requests the existing records with a prefix, or the one with an ID, in the order of IDs.
+struct PageRequest {
+  // Ignored unless `ids` is empty.
+  std::string prefix = {};
+  // At most one ID.
+  std::vector<std::string> ids = {};
+  RecordKinds kinds = {};
+  // The page begins after this ID.
+  std::string after = {};
+  size_t page_size = 0;
+};
+
+// Existing hulls and bodies by ID, each of kind PRESENT, including damaged ones.
+struct RecordPage {
+  uint64_t store_revision = 0;
+  std::vector<HullChange> entries = {};
+  // True if more hulls or bodies follow.
+  bool more = false;
+};
+
+// Reads the committed hulls and bodies page by page. Guarded by the registry's mutex.
+class PageSource {
+ public:
+  // Calls `done` exactly once with the mutex held: before ReadPage returns if the tables contain
+  // all records, otherwise later, on another thread. The page includes every change up to the
+  // feed's revision at the time `done` is called, or up to a later one. UNAVAILABLE: the store
+  // cannot be read.
+  virtual void ReadPage(Locked& locked, PageRequest request,
+                        std::function<void(Locked&, absl::StatusOr<RecordPage>)> done) = 0;
+
+ protected:
+  ~PageSource() = default;
+};
+
+// The hulls that a watch reports: those with a prefix, or a set of IDs.
+struct WatchTarget {
+  bool Includes(const std::string& id) const {
+    return ids.empty() ? id.starts_with(prefix) : ids.contains(id);
+  }
+  bool operator==(const WatchTarget&) const = default;
+
+  // Ignored unless `ids` is empty.
+  std::string prefix = {};
+  std::set<std::string> ids = {};
+  // Includes bodies.
+  bool bodies = false;
+  // True: the watch first lists the existing hulls, by prefix or for a single ID. False: it reports
+  // only later changes, because its reader reads existing hulls itself; it then reports every
+  // deletion, and IDs can be added and removed (ChangeFeed::ChangeIds).
+  bool lists_existing = true;
+};
+
+// A watch resumes after this revision of this store. 0: it does not resume.
+struct WatchPosition {
+  uint64_t after_revision = 0;
+  std::string store_id = {};
+};
+
+// The next changes that a watch reports.
+struct WatchBatch {
+  // No change is pending; the watch's on_ready will be called once when one is.
+  bool waits = false;
+  // Every change up to this revision was sent before, is in `changes`, or was superseded.
+  uint64_t revision = 0;
+  std::vector<HullChange> changes = {};
+  // `synced` and `restarted` of v1::WatchHullsResponse.
+  bool synced = false;
+  bool restarted = false;
+};
+
+struct WatchGroup;
+
+// A cursor in the changes of its target. Accessed only by the ChangeFeed, whose mutex guards it.
+class Watch {
+ public:
+  // The order of opening, which does not depend on addresses.
+  struct Order {
+    bool operator()(const std::shared_ptr<Watch>& a, const std::shared_ptr<Watch>& b) const {
+      return a->number_ < b->number_;
+    }
+  };
+  using Set = std::set<std::shared_ptr<Watch>, Order>;
+
+ private:
+  friend class ChangeFeed;
+
+  enum class State {
+    // Reports deletions since it was last synced, if it resumes, then the existing hulls by ID.
+    kCatchingUp,
+    // The pending changes fill several batches. The state at the cursor is not that of any
+    // revision, so hulls are reported as PRESENT or DELETED.
+    kBehind,
+    // Has reported exactly the state at the cursor.
+    kSynced,
+  };
+  static constexpr uint64_t kNoDeletions = std::numeric_limits<uint64_t>::max();
+  // Null: not requested. Without a value: in flight.
+  using PendingPage = std::shared_ptr<std::optional<absl::StatusOr<RecordPage>>>;
+
+  // Progress of kCatchingUp.
+  struct CatchUp {
+    // Existing hulls are listed if they changed after this revision.
+    uint64_t after_revision = 0;
+    // Deletions are reported after this revision; kNoDeletions: no more.
+    uint64_t deletions_after = kNoDeletions;
+    // The last listed ID.
+    std::string last_id;
+    // The next existing hulls, if they are read from the store.
+    PendingPage page;
+  };
+
+  // Greater than the number of every watch that was open when this one was opened.
+  uint64_t number_ = 0;
+  std::shared_ptr<WatchGroup> group_;
+  // Called on the feed's thread without locks.
+  std::function<void()> on_ready_;
+  State state_ = State::kSynced;
+  CatchUp catch_up_;
+  // Every change up to this revision was reported, or precedes the listing.
+  uint64_t cursor_ = 0;
+  // The cursor of the last batch that did not wait.
+  uint64_t reported_ = 0;
+  // The listing ended at this revision, and `synced` is due there.
+  std::optional<uint64_t> synced_at_;
+  // True if the next batch must report that the watch started over.
+  bool restarted_ = false;
+  // True if on_ready is due at the next change.
+  bool is_waiting_ = false;
+  // True if the next batch does not wait.
+  bool is_nudged_ = false;
+};
 
 // A hull or body from its creation or replacement to its end.
 struct Incarnation {
@@ -35,6 +171,51 @@ struct Incarnation {
   bool is_body = false;
 
   bool operator==(const Incarnation&) const = default;
+};
+
+// The most recent deletions of hulls and bodies, in the order of their revisions, for watches that
+// resume: a deletion leaves no trace in the store. Not thread-safe.
+class DeletionLog {
+ public:
+  // Maximum number of deletions: 25 MiB with IDs of maximum length, outside the memory budget.
+  static constexpr size_t kCapacity = 1 << 16;
+
+  struct Deletion {
+    uint64_t revision;
+    std::string id;
+    bool was_body;
+  };
+
+  // Starts an empty log at this revision.
+  void Begin(uint64_t revision) { begin_ = revision; }
+  // Adds a deletion. Requires a revision above that of the last deletion.
+  void Add(const std::string& id, uint64_t revision, bool was_body);
+  // Notes that a hull or body was created.
+  void NoteCreation(const std::string& id, bool is_body);
+
+  // Returns true if the log contains every deletion after this revision.
+  bool IsCompleteAfter(uint64_t revision) const { return revision >= begin_; }
+  // Returns the first deletion after this revision, or end().
+  std::deque<Deletion>::const_iterator After(uint64_t revision) const;
+  std::deque<Deletion>::const_iterator end() const { return log_.end(); }
+  // Returns true if the ID has been unused since this deletion, or since later ones that a watch of
+  // hulls does not report. bodies: bodies count, too. Requires a deletion in the log.
+  bool IsFinal(const Deletion& deletion, bool bodies) const;
+
+ private:
+  // The last deletion of an ID without a hull created since.
+  struct Last {
+    uint64_t revision;
+    // The last deletion of a hull since one was created; 0: none.
+    uint64_t hull_revision;
+    bool is_body_now = false;
+  };
+
+  std::deque<Deletion> log_;
+  // The log is complete after this revision.
+  uint64_t begin_ = 0;
+  // Keys are the IDs in `log_`.
+  std::unordered_map<std::string_view, Last> last_;
 };
 
 // Sends the initial state and then every change of hulls and bodies to watches. A watch first
@@ -71,13 +252,13 @@ class ChangeFeed {
   // all other functions.
   void Begin(uint64_t revision, PageSource& pages);
 
-  // Note a committed change at the revision of its record, or at `revision`. former: the
-  // incarnation that had the ID before, possibly the same one; nullopt: none. It is of the other
-  // kind if peer servers turned a hull into a body, or a body into a hull, by several changes.
-  // Cost: O(log n) per group that includes the ID, and one hash per length of a watched prefix.
-  void NoteHull(Locked& locked, const std::optional<Incarnation>& former, const HullPointer& hull);
-  void NoteBody(Locked& locked, const std::optional<Incarnation>& former,
-                const std::shared_ptr<const Body>& body);
+  // Note a committed change at the revision of its record, or at `revision`. body: null for a
+  // change of a hull. former: the incarnation that had the ID before, possibly the same one;
+  // nullopt: none. It is of the other kind if peer servers turned a hull into a body, or a body
+  // into a hull, by several changes. Cost: O(log n) per group that includes the ID, and one hash
+  // per length of a watched prefix.
+  void NotePresent(Locked& locked, const std::optional<Incarnation>& former,
+                   const HullPointer& hull, const std::shared_ptr<const Body>& body);
   void NoteDeleted(Locked& locked, const std::string& id, const Incarnation& former,
                    uint64_t revision);
   // Notes a revision whose change cannot be described; only the revision is reported.
@@ -104,12 +285,8 @@ class ChangeFeed {
   void EndAll();
 
  private:
-  struct Hash {
-    using is_transparent = void;
-    size_t operator()(std::string_view text) const { return std::hash<std::string_view>()(text); }
-  };
   using Groups = std::vector<std::shared_ptr<WatchGroup>>;
-  using GroupsByName = std::unordered_map<std::string, Groups, Hash, std::equal_to<>>;
+  using GroupsByName = absl::flat_hash_map<std::string, Groups>;
 
   // A change of the hull or body with an ID.
   struct Change {
@@ -129,14 +306,11 @@ class ChangeFeed {
 
   static std::optional<Change> AsReportedTo(const WatchTarget& target, const Change& change);
   void Note(Locked& locked, const std::string& id, const Change& change);
-  void NotePresent(Locked& locked, const std::string& id, const std::optional<Incarnation>& former,
-                   Change change);
   void NoteFor(Locked& locked, const std::shared_ptr<WatchGroup>& group, const std::string& id,
                const Change& change);
 
   std::shared_ptr<WatchGroup> GroupOf(const WatchTarget& target);
   void RemoveGroup(const std::shared_ptr<WatchGroup>& group);
-  void AddId(const std::string& id, const std::shared_ptr<WatchGroup>& group);
   void RemoveId(const std::string& id, const std::shared_ptr<WatchGroup>& group);
   void DropChanges(WatchGroup& group);
   void Charge(uint64_t before, uint64_t now);

@@ -118,7 +118,8 @@ void LogFileSystem::NoteCommitted() {
 // If a write fails, the mark remains a lower bound. Logs only the first of successive failures.
 void LogFileSystem::WriteMark() {
   mark_changed_ = true;
-  const IOStatus written = mark_file_->Write(mark_);
+  ++mark_.generation;
+  const IOStatus written = WriteLogMark(*mark_file_, mark_);
   if (!std::exchange(mark_fails_, !written.ok()) && !written.ok()) {
     spdlog::error("cannot update the log mark, which is now stale: {}", written.ToString());
   }
@@ -134,13 +135,13 @@ void LogFileSystem::Commit(uint64_t revision, bool is_synced) {
 }
 
 IOStatus LogFileSystem::SyncMark() {
-  std::shared_ptr<LogMarkFile> file;
+  std::shared_ptr<rocksdb::FSRandomRWFile> file;
   {
     const std::lock_guard lock(mutex_);
     if (!std::exchange(mark_changed_, false)) return IOStatus::OK();
     file = mark_file_;
   }
-  const IOStatus synced = file->Sync();
+  const IOStatus synced = file->Sync(IOOptions(), nullptr);
   if (!synced.ok()) {
     const std::lock_guard lock(mutex_);
     mark_changed_ = true;
@@ -149,8 +150,8 @@ IOStatus LogFileSystem::SyncMark() {
 }
 
 IOStatus LogFileSystem::ResumeMark(const std::string& path, LogMark mark) {
-  std::unique_ptr<LogMarkFile> file;
-  const IOStatus opened = LogMarkFile::Open(*target(), path, mark, false, &file);
+  std::unique_ptr<rocksdb::FSRandomRWFile> file;
+  IOStatus opened = target()->NewRandomRWFile(path, rocksdb::FileOptions(), &file, nullptr);
   if (!opened.ok()) return opened;
   const std::lock_guard lock(mutex_);
   mark_ = std::move(mark);
@@ -159,13 +160,15 @@ IOStatus LogFileSystem::ResumeMark(const std::string& path, LogMark mark) {
 }
 
 IOStatus LogFileSystem::StartMark(const std::string& path, uint64_t revision) {
-  const std::lock_guard lock(mutex_);
-  mark_ = {revision, {}};
-  NoteCommitted();
-  std::unique_ptr<LogMarkFile> file;
-  const IOStatus opened = LogMarkFile::Open(*target(), path, mark_, true, &file);
-  if (opened.ok()) mark_file_ = std::move(file);
-  return opened;
+  LogMark mark;
+  {
+    const std::lock_guard lock(mutex_);
+    mark_ = {1, revision, {}};
+    NoteCommitted();
+    mark = mark_;
+  }
+  const IOStatus made = MakeLogMark(*target(), path, mark);
+  return made.ok() ? ResumeMark(path, std::move(mark)) : made;
 }
 
 bool LogFileSystem::keeps_mark() const {

@@ -102,7 +102,7 @@ class LogFileSystem : public rocksdb::FileSystemWrapper {
   std::map<std::string, LogState> logs_;
   LogMark mark_;
   // Null: no mark is kept.
-  std::shared_ptr<LogMarkFile> mark_file_;
+  std::shared_ptr<rocksdb::FSRandomRWFile> mark_file_;
   bool mark_changed_ = false;
   bool mark_fails_ = false;
 };

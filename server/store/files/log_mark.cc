@@ -10,7 +10,8 @@
 #include <cstring>
 #include <filesystem>
 #include <iterator>
-#include <limits>
+#include <memory>
+#include <utility>
 
 #include "core/base/status_macros.h"
 
@@ -46,9 +47,9 @@ uint64_t ChecksumOf(const Slot& slot) {
 }
 
 // Encodes only the newest logs if the slot cannot hold all of them. RocksDB keeps one to three.
-Slot Encode(const LogMark& mark, uint64_t generation) {
+Slot Encode(const LogMark& mark) {
   const size_t count = std::min(mark.logs.size(), kMaxLogs);
-  Slot slot = {generation, mark.revision, count};
+  Slot slot = {mark.generation, mark.revision, count};
   auto log = std::prev(mark.logs.end(), static_cast<std::ptrdiff_t>(count));
   for (size_t word = kHeadWords; log != mark.logs.end(); ++log, word += kLogWords) {
     slot[word] = log->first;
@@ -59,45 +60,15 @@ Slot Encode(const LogMark& mark, uint64_t generation) {
   return slot;
 }
 
-struct Decoded {
-  uint64_t generation = 0;
-  LogMark mark;
-};
-
 // None if the slot was never written, or is damaged.
-std::optional<Decoded> Decode(const Slot& slot) {
-  if (slot.back() != ChecksumOf(slot) || slot[2] > kMaxLogs) return std::nullopt;
-  Decoded decoded = {slot[0], {slot[1], {}}};
+std::optional<LogMark> Decode(const Slot& slot) {
+  if (slot.back() != ChecksumOf(slot) || slot[0] == 0 || slot[2] > kMaxLogs) return std::nullopt;
+  LogMark mark = {slot[0], slot[1], {}};
   for (size_t i = 0; i < slot[2]; ++i) {
     const uint64_t* const log = &slot[kHeadWords + i * kLogWords];
-    decoded.mark.logs[log[0]] = {log[1], static_cast<uint32_t>(log[2])};
+    mark.logs[log[0]] = {log[1], static_cast<uint32_t>(log[2])};
   }
-  return decoded.generation == 0 ? std::nullopt : std::optional(decoded);
-}
-
-absl::StatusOr<std::optional<Decoded>> ReadNewest(rocksdb::FileSystem& files,
-                                                  const std::string& path) {
-  const IOStatus exists = files.FileExists(path, IOOptions(), nullptr);
-  if (exists.IsNotFound()) return std::nullopt;
-  std::unique_ptr<rocksdb::FSRandomAccessFile> file;
-  IOStatus status = files.NewRandomAccessFile(path, FileOptions(), &file, nullptr);
-  std::optional<Decoded> newest;
-  for (uint64_t offset = 0; status.ok() && offset <= kSlotDistance; offset += kSlotDistance) {
-    Slot slot;
-    char scratch[sizeof(Slot)];
-    rocksdb::Slice bytes;
-    status = file->Read(offset, sizeof(Slot), IOOptions(), &bytes, scratch, nullptr);
-    if (!status.ok() || bytes.size() != sizeof(Slot)) continue;
-    std::memcpy(slot.data(), bytes.data(), sizeof(Slot));
-    std::optional<Decoded> decoded = Decode(slot);
-    if (!decoded.has_value()) continue;
-    if (!newest.has_value() || decoded->generation > newest->generation) newest = decoded;
-  }
-  if (!status.ok()) {
-    return absl::UnavailableError(absl::StrCat("cannot read ", path, ": ", status.ToString()));
-  }
-  if (!newest.has_value()) return absl::DataLossError(absl::StrCat(path, " is damaged"));
-  return newest;
+  return mark;
 }
 
 // Returns a description of the difference; empty if the log starts with these bytes.
@@ -131,20 +102,6 @@ absl::StatusOr<std::string> Compare(rocksdb::FileSystem& files, const std::strin
   return absl::StrCat("the contents of the log ", name, " differ from what was written");
 }
 
-// Renamed only after it is complete and on disk.
-IOStatus Make(rocksdb::FileSystem& files, const std::string& path, const Slot& slot) {
-  const std::string unfinished = path + ".new";
-  std::unique_ptr<rocksdb::FSWritableFile> file;
-  IOStatus status = files.NewWritableFile(unfinished, FileOptions(), &file, nullptr);
-  std::string content(2 * kSlotDistance, '\0');
-  content.replace(0, sizeof(Slot), Bytes(slot));
-  if (status.ok()) status = file->Append(content, IOOptions(), nullptr);
-  if (status.ok()) status = file->Sync(IOOptions(), nullptr);
-  if (status.ok()) status = file->Close(IOOptions(), nullptr);
-  if (status.ok()) status = files.RenameFile(unfinished, path, IOOptions(), nullptr);
-  return status.ok() ? SyncDirectory(files, std::filesystem::path(path).parent_path()) : status;
-}
-
 }  // namespace
 
 IOStatus SyncDirectory(rocksdb::FileSystem& files, const std::string& directory) {
@@ -174,32 +131,49 @@ absl::StatusOr<std::optional<LostLog>> FindLostLog(rocksdb::FileSystem& files,
   return std::nullopt;
 }
 
-absl::StatusOr<std::optional<LogMark>> LogMarkFile::Read(rocksdb::FileSystem& files,
-                                                         const std::string& path) {
-  HULLD_ASSIGN_OR_RETURN(std::optional<Decoded> newest, ReadNewest(files, path));
-  if (!newest.has_value()) return std::nullopt;
-  return std::move(newest->mark);
-}
-
-IOStatus LogMarkFile::Open(rocksdb::FileSystem& files, const std::string& path, const LogMark& mark,
-                           bool replace, std::unique_ptr<LogMarkFile>* result) {
-  uint64_t generation = 1;
-  const absl::StatusOr<std::optional<Decoded>> newest = ReadNewest(files, path);
-  if (!replace && newest.ok() && newest->has_value()) {
-    generation = (*newest)->generation;
-  } else if (IOStatus made = Make(files, path, Encode(mark, generation)); !made.ok()) {
-    return made;
+absl::StatusOr<std::optional<LogMark>> ReadLogMark(rocksdb::FileSystem& files,
+                                                   const std::string& path) {
+  const IOStatus exists = files.FileExists(path, IOOptions(), nullptr);
+  if (exists.IsNotFound()) return std::nullopt;
+  std::unique_ptr<rocksdb::FSRandomAccessFile> file;
+  IOStatus status = files.NewRandomAccessFile(path, FileOptions(), &file, nullptr);
+  std::optional<LogMark> newest;
+  for (uint64_t offset = 0; status.ok() && offset <= kSlotDistance; offset += kSlotDistance) {
+    Slot slot;
+    char scratch[sizeof(Slot)];
+    rocksdb::Slice bytes;
+    status = file->Read(offset, sizeof(Slot), IOOptions(), &bytes, scratch, nullptr);
+    if (!status.ok() || bytes.size() != sizeof(Slot)) continue;
+    std::memcpy(slot.data(), bytes.data(), sizeof(Slot));
+    std::optional<LogMark> mark = Decode(slot);
+    if (!mark.has_value()) continue;
+    if (!newest.has_value() || mark->generation > newest->generation) newest = std::move(mark);
   }
-  std::unique_ptr<rocksdb::FSRandomRWFile> file;
-  const IOStatus opened = files.NewRandomRWFile(path, FileOptions(), &file, nullptr);
-  if (opened.ok()) result->reset(new LogMarkFile(std::move(file), generation));
-  return opened;
+  if (!status.ok()) {
+    return absl::UnavailableError(absl::StrCat("cannot read ", path, ": ", status.ToString()));
+  }
+  if (!newest.has_value()) return absl::DataLossError(absl::StrCat(path, " is damaged"));
+  return newest;
 }
 
-IOStatus LogMarkFile::Write(const LogMark& mark) {
-  const Slot slot = Encode(mark, ++generation_);
-  return file_->Write(generation_ % 2 * kSlotDistance, {Bytes(slot).data(), sizeof(Slot)},
-                      IOOptions(), nullptr);
+// Renamed only after it is complete and on disk.
+IOStatus MakeLogMark(rocksdb::FileSystem& files, const std::string& path, const LogMark& mark) {
+  const std::string unfinished = path + ".new";
+  std::unique_ptr<rocksdb::FSWritableFile> file;
+  IOStatus status = files.NewWritableFile(unfinished, FileOptions(), &file, nullptr);
+  std::string content(2 * kSlotDistance, '\0');
+  content.replace(0, sizeof(Slot), Bytes(Encode(mark)));
+  if (status.ok()) status = file->Append(content, IOOptions(), nullptr);
+  if (status.ok()) status = file->Sync(IOOptions(), nullptr);
+  if (status.ok()) status = file->Close(IOOptions(), nullptr);
+  if (status.ok()) status = files.RenameFile(unfinished, path, IOOptions(), nullptr);
+  return status.ok() ? SyncDirectory(files, std::filesystem::path(path).parent_path()) : status;
+}
+
+IOStatus WriteLogMark(rocksdb::FSRandomRWFile& file, const LogMark& mark) {
+  const Slot slot = Encode(mark);
+  return file.Write(mark.generation % 2 * kSlotDistance, {Bytes(slot).data(), sizeof(Slot)},
+                    IOOptions(), nullptr);
 }
 
 }  // namespace hulld::server

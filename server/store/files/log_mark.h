@@ -7,10 +7,8 @@
 
 #include <cstdint>
 #include <map>
-#include <memory>
 #include <optional>
 #include <string>
-#include <utility>
 
 namespace hulld::server {
 
@@ -25,12 +23,12 @@ struct LogMark {
     friend bool operator==(const Synced&, const Synced&) = default;
   };
 
+  // Number of writes of the mark; 0: none.
+  uint64_t generation = 0;
   // The store's last acknowledged revision.
   uint64_t revision = 0;
   // The live logs, by their numbers.
   std::map<uint64_t, Synced> logs;
-
-  friend bool operator==(const LogMark&, const LogMark&) = default;
 };
 
 // Makes the entries of a directory durable.
@@ -52,33 +50,19 @@ absl::StatusOr<std::optional<LostLog>> FindLostLog(rocksdb::FileSystem& files,
                                                    const std::string& directory,
                                                    const LogMark& mark);
 
-// The file that keeps the mark. Two slots of one sector each are overwritten in turn, so that one
+// The file of the mark has two slots of one sector each that are overwritten in turn, so that one
 // is intact after a power failure, and a full disk does not prevent writing.
-class LogMarkFile {
- public:
-  // Reads the mark; none if the file does not exist. DATA_LOSS: the file contains no mark.
-  // UNAVAILABLE: it cannot be read.
-  static absl::StatusOr<std::optional<LogMark>> Read(rocksdb::FileSystem& files,
-                                                     const std::string& path);
-  // Opens the file for writing. Creates it durably, with `mark`, if it does not exist or `replace`
-  // is true. Requires: an existing file that is kept contains `mark`.
-  static rocksdb::IOStatus Open(rocksdb::FileSystem& files, const std::string& path,
-                                const LogMark& mark, bool replace,
-                                std::unique_ptr<LogMarkFile>* result);
-
-  // Overwrites the older slot. The result survives a crash of the process; of the machine only
-  // after Sync. Not thread-safe.
-  rocksdb::IOStatus Write(const LogMark& mark);
-  // Any thread.
-  rocksdb::IOStatus Sync() { return file_->Sync(rocksdb::IOOptions(), nullptr); }
-
- private:
-  LogMarkFile(std::unique_ptr<rocksdb::FSRandomRWFile> file, uint64_t generation)
-      : file_(std::move(file)), generation_(generation) {}
-
-  const std::unique_ptr<rocksdb::FSRandomRWFile> file_;
-  uint64_t generation_;
-};
+//
+// Reads the mark; none if the file does not exist. DATA_LOSS: the file contains no mark.
+// UNAVAILABLE: it cannot be read.
+absl::StatusOr<std::optional<LogMark>> ReadLogMark(rocksdb::FileSystem& files,
+                                                   const std::string& path);
+// Creates the file durably, or replaces it.
+rocksdb::IOStatus MakeLogMark(rocksdb::FileSystem& files, const std::string& path,
+                              const LogMark& mark);
+// Overwrites the older slot. Requires: the generation is one above that of the last write. The
+// result survives a crash of the process; of the machine only after a sync.
+rocksdb::IOStatus WriteLogMark(rocksdb::FSRandomRWFile& file, const LogMark& mark);
 
 }  // namespace hulld::server
 

@@ -1,9 +1,9 @@
 #include "server/store/postgres/batch_statements.h"
 
 #include <algorithm>
-#include <initializer_list>
 #include <iterator>
 #include <map>
+#include <string>
 #include <string_view>
 #include <utility>
 
@@ -51,110 +51,90 @@ void HullRows::Add(const Change& change) {
   }
 }
 
-// Rows of a table, column by column.
-class RowsOfTable {
- public:
-  RowsOfTable(const char* statement, std::initializer_list<Element> columns)
-      : statement_(statement), columns_(columns.begin(), columns.end()) {}
-
-  void Add(std::initializer_list<std::string_view> row, std::vector<Statement>* statements) {
-    size_t bytes = 0;
-    auto column = columns_.begin();
-    for (const std::string_view value : row) {
-      column->Add(value);
-      bytes += (column++)->bytes();
-    }
-    if (bytes >= kMaxStatementBytes) Flush(statements);
-  }
-
-  void Flush(std::vector<Statement>* statements) {
-    if (columns_.front().count() == 0) return;
-    Statement statement = {.name = statement_};
-    for (ArrayParameter& column : columns_) statement.parameters.push_back(column.Take());
-    statements->push_back(std::move(statement));
-  }
-
- private:
-  const char* const statement_;
-  std::vector<ArrayParameter> columns_;
+// A value of a row, in binary format.
+struct Value {
+  Element element;
+  std::string bytes;
 };
 
+Value Text(const std::string& text) { return {Element::kText, text}; }
+Value Bigint(uint64_t number) { return {Element::kBigint, EncodeBigint(number)}; }
+Value Sealed(std::string_view key, std::string value) {
+  return {Element::kBytea, Seal(key, std::move(value))};
+}
+
+// Rows of prepared statements, column by column.
 class Encoder {
  public:
-  void AddDrops(const std::string& hull_id, const HullRows& rows) {
-    if (rows.last->deleted) no_hulls_.Add({hull_id}, &drops_);
-    if (rows.drops_all) no_writers_.Add({hull_id}, &drops_);
-    if (!rows.drops_all && !rows.drops_vertices) return;
-    no_bases_.Add({hull_id}, &drops_);
-    no_deltas_.Add({hull_id}, &drops_);
-  }
-
-  void AddRows(const std::string& hull_id, const HullRows& rows) {
-    if (rows.last->deleted) return;
-    const HullRecord& record = rows.last->hull.record;
-    const uint64_t incarnation = record.create_revision;
-    hulls_.Add({hull_id, Seal(HullKey(hull_id), EncodeStoredHull(rows.last->hull))}, &puts_);
-    const std::string incarnation_column = EncodeBigint(incarnation);
-    for (const auto& [writer_id, sequence] : rows.sequences) {
-      writers_.Add({hull_id, incarnation_column, writer_id,
-                    Seal(WriterKey(incarnation, writer_id), EncodeNumber(sequence))},
-                   &puts_);
+  void Add(std::string_view statement, const std::vector<Value>& row) {
+    std::vector<ArrayParameter>& columns = columns_[statement];
+    size_t bytes = 0;
+    for (size_t i = 0; i < row.size(); ++i) {
+      if (columns.size() == i) columns.emplace_back(row[i].element);
+      columns[i].Add(row[i].bytes);
+      bytes += columns[i].bytes();
     }
-    if (rows.base != nullptr) AddBase(hull_id, *rows.base);
-    for (const Change* delta : rows.deltas) {
-      const uint64_t revision = delta->hull.record.revision;
-      deltas_.Add({hull_id, incarnation_column, EncodeBigint(revision),
-                   Seal(DeltaKey(incarnation, revision), EncodeVertices(delta->vertices))},
-                  &puts_);
-    }
-  }
-
-  void AddBody(const std::string& body_id, const Change& last) {
-    if (last.deleted) return no_bodies_.Add({body_id}, &drops_);
-    bodies_.Add({body_id, Seal(BodyKey(body_id), EncodeStoredBody(*last.body))}, &puts_);
+    if (bytes >= kMaxStatementBytes) Flush(statement, columns);
   }
 
   std::vector<Statement> Take() && {
-    for (RowsOfTable* table : {&no_hulls_, &no_bodies_, &no_writers_, &no_bases_, &no_deltas_}) {
-      table->Flush(&drops_);
-    }
-    for (RowsOfTable* table : {&hulls_, &bodies_, &writers_, &bases_, &deltas_})
-      table->Flush(&puts_);
-    std::ranges::move(puts_, std::back_inserter(drops_));
-    return std::move(drops_);
+    for (auto& [statement, columns] : columns_) Flush(statement, columns);
+    return std::move(statements_);
   }
 
  private:
-  void AddBase(const std::string& hull_id, const Change& change) {
-    const uint64_t incarnation = change.hull.record.create_revision;
-    const uint64_t revision = change.hull.record.revision;
-    std::span<const Vector> rest = change.vertices;
-    for (uint32_t part = 0; !rest.empty(); ++part) {
-      const auto vertices = rest.first(std::min(rest.size(), kBasePartVertices));
-      bases_.Add({hull_id, EncodeBigint(incarnation), EncodeBigint(revision), EncodeInteger(part),
-                  Seal(BaseKey(incarnation, revision, part), EncodeVertices(vertices))},
-                 &puts_);
-      rest = rest.subspan(vertices.size());
-    }
+  void Flush(std::string_view statement, std::vector<ArrayParameter>& columns) {
+    if (columns.front().count() == 0) return;
+    Statement& full = statements_.emplace_back(Statement{.name = statement.data()});
+    for (ArrayParameter& column : columns) full.parameters.push_back(column.Take());
   }
 
-  std::vector<Statement> drops_;
-  std::vector<Statement> puts_;
-  RowsOfTable no_hulls_{"hulld_drop_hulls", {Element::kText}};
-  RowsOfTable no_bodies_{"hulld_drop_bodies", {Element::kText}};
-  RowsOfTable no_writers_{"hulld_drop_writers", {Element::kText}};
-  RowsOfTable no_bases_{"hulld_drop_bases", {Element::kText}};
-  RowsOfTable no_deltas_{"hulld_drop_deltas", {Element::kText}};
-  RowsOfTable hulls_{"hulld_put_hulls", {Element::kText, Element::kBytea}};
-  RowsOfTable bodies_{"hulld_put_bodies", {Element::kText, Element::kBytea}};
-  RowsOfTable writers_{"hulld_put_writers",
-                       {Element::kText, Element::kBigint, Element::kText, Element::kBytea}};
-  RowsOfTable bases_{
-      "hulld_put_bases",
-      {Element::kText, Element::kBigint, Element::kBigint, Element::kInteger, Element::kBytea}};
-  RowsOfTable deltas_{"hulld_put_deltas",
-                      {Element::kText, Element::kBigint, Element::kBigint, Element::kBytea}};
+  std::vector<Statement> statements_;
+  std::map<std::string_view, std::vector<ArrayParameter>> columns_;
 };
+
+void AddDrops(const std::string& hull_id, const HullRows& rows, Encoder& drops) {
+  if (rows.last->deleted) drops.Add("hulld_drop_hulls", {Text(hull_id)});
+  if (rows.drops_all) drops.Add("hulld_drop_writers", {Text(hull_id)});
+  if (!rows.drops_all && !rows.drops_vertices) return;
+  drops.Add("hulld_drop_bases", {Text(hull_id)});
+  drops.Add("hulld_drop_deltas", {Text(hull_id)});
+}
+
+void AddBase(const std::string& hull_id, const Change& change, Encoder& puts) {
+  const uint64_t incarnation = change.hull.record.create_revision;
+  const uint64_t revision = change.hull.record.revision;
+  std::span<const Vector> rest = change.vertices;
+  for (uint32_t part = 0; !rest.empty(); ++part) {
+    const auto vertices = rest.first(std::min(rest.size(), kBasePartVertices));
+    puts.Add("hulld_put_bases",
+             {Text(hull_id),
+              Bigint(incarnation),
+              Bigint(revision),
+              {Element::kInteger, EncodeInteger(part)},
+              Sealed(BaseKey(incarnation, revision, part), EncodeVertices(vertices))});
+    rest = rest.subspan(vertices.size());
+  }
+}
+
+void AddRows(const std::string& hull_id, const HullRows& rows, Encoder& puts) {
+  if (rows.last->deleted) return;
+  const uint64_t incarnation = rows.last->hull.record.create_revision;
+  puts.Add("hulld_put_hulls",
+           {Text(hull_id), Sealed(HullKey(hull_id), EncodeStoredHull(rows.last->hull))});
+  for (const auto& [writer_id, sequence] : rows.sequences) {
+    puts.Add("hulld_put_writers",
+             {Text(hull_id), Bigint(incarnation), Text(writer_id),
+              Sealed(WriterKey(incarnation, writer_id), EncodeNumber(sequence))});
+  }
+  if (rows.base != nullptr) AddBase(hull_id, *rows.base, puts);
+  for (const Change* delta : rows.deltas) {
+    const uint64_t revision = delta->hull.record.revision;
+    puts.Add("hulld_put_deltas",
+             {Text(hull_id), Bigint(incarnation), Bigint(revision),
+              Sealed(DeltaKey(incarnation, revision), EncodeVertices(delta->vertices))});
+  }
+}
 
 }  // namespace
 
@@ -219,11 +199,22 @@ std::vector<Statement> StatementsOf(std::span<const Change* const> changes) {
       hulls[change->hull.record.hull_id].Add(*change);
     }
   }
-  Encoder encoder;
-  for (const auto& [hull_id, rows] : hulls) encoder.AddDrops(hull_id, rows);
-  for (const auto& [hull_id, rows] : hulls) encoder.AddRows(hull_id, rows);
-  for (const auto& [body_id, last] : bodies) encoder.AddBody(body_id, *last);
-  return std::move(encoder).Take();
+  Encoder drops;
+  Encoder puts;
+  for (const auto& [hull_id, rows] : hulls) {
+    AddDrops(hull_id, rows, drops);
+    AddRows(hull_id, rows, puts);
+  }
+  for (const auto& [id, last] : bodies) {
+    if (last->deleted) {
+      drops.Add("hulld_drop_bodies", {Text(id)});
+    } else {
+      puts.Add("hulld_put_bodies", {Text(id), Sealed(BodyKey(id), EncodeStoredBody(*last->body))});
+    }
+  }
+  std::vector<Statement> statements = std::move(drops).Take();
+  std::ranges::move(std::move(puts).Take(), std::back_inserter(statements));
+  return statements;
 }
 
 }  // namespace hulld::server

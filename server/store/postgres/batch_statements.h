@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "server/store/postgres/parameters.h"
+#include "server/store/postgres/session.h"
 #include "server/store/store.h"
 
 namespace hulld::server {

@@ -89,7 +89,7 @@ constexpr char kTables[] = R"(
   ALTER TABLE hulld.deltas ALTER COLUMN vertices SET STORAGE EXTERNAL;)";
 
 // Settings of every session. The database aborts statements of a server that has disconnected, or
-// that stalls while it holds locks. The timeouts are a choice, as in conninfo.cc, and shorter than
+// that stalls while it holds locks. The timeouts are a choice, as in session.cc, and shorter than
 // PostgresOptions::answer_time. Every statement uses an index, even if its plan was made when the
 // table was small.
 constexpr char kSettings[] = R"(
@@ -166,8 +166,10 @@ constexpr char kPrepareReads[] = R"(
       WHERE hull_id = $1 AND incarnation = $2 AND revision > $3 AND revision <= $4
       ORDER BY revision;
     PREPARE hulld_sequence(text, bigint, text) AS
-      SELECT sequence FROM hulld.writers
-      WHERE hull_id = $1 AND incarnation = $2 AND writer_id = $3;
+      SELECT w.sequence, h.record FROM hulld.hulls h
+      LEFT JOIN hulld.writers w
+        ON w.hull_id = h.hull_id AND w.incarnation = $2 AND w.writer_id = $3
+      WHERE h.hull_id = $1;
     PREPARE hulld_writers(text, bigint) AS
       SELECT writer_id, sequence FROM hulld.writers
       WHERE hull_id = $1 AND incarnation = $2 ORDER BY writer_id;)";
@@ -202,21 +204,14 @@ PostgresStore::PostgresStore(PostgresOptions options, Conninfo conninfo)
       follower_([this] { return OpenReader(); }, 1) {}
 
 absl::StatusOr<std::unique_ptr<PostgresStore>> PostgresStore::Open(PostgresOptions options) {
-  absl::StatusOr<Conninfo> conninfo = Conninfo::Parse(options.conninfo);
+  absl::StatusOr<Conninfo> conninfo = ParseConninfo(options.conninfo);
   if (!conninfo.ok()) {
     return Prefixed(absl::StrCat(PostgresOptions::kSetting, ": "), conninfo.status());
   }
   std::unique_ptr<PostgresStore> store(new PostgresStore(std::move(options), *std::move(conninfo)));
-  absl::StatusOr<std::unique_ptr<Session>> session = store->OpenKeeper();
-  if (!session.ok()) return OpenFailed(session.status());
-  store->keeper_session_ = *std::move(session);
-  if (absl::Status s = store->CheckServer(*store->keeper_session_); !s.ok()) return OpenFailed(s);
-  if (absl::Status s = store->WaitForTurn(); !s.ok()) return OpenFailed(s);
-  Session& keeper = *store->keeper_session_;
+  if (absl::Status s = store->BecomeActive(); !s.ok()) return OpenFailed(s);
+  const Session& keeper = *store->keeper_session_;
   const bool shared = store->options_.shared;
-  const absl::Status made = shared ? store->MakeSharedSchema(keeper) : store->MakeSchema(keeper);
-  if (!made.ok()) return OpenFailed(made);
-  if (absl::Status s = store->BeginPatiently(); !s.ok()) return OpenFailed(s);
   spdlog::info(
       "store: {}, PostgreSQL {}; acknowledged changes are committed there{} (synchronous_commit = "
       "{}); {}epoch {}",
@@ -227,6 +222,15 @@ absl::StatusOr<std::unique_ptr<PostgresStore>> PostgresStore::Open(PostgresOptio
   if (shared && store->options_.notices) store->StartNotices();
   store->keeper_ = std::thread([raw = store.get()] { raw->Keep(); });
   return store;
+}
+
+absl::Status PostgresStore::BecomeActive() {
+  HULLD_ASSIGN_OR_RETURN(keeper_session_, OpenKeeper());
+  HULLD_RETURN_IF_ERROR(CheckServer(*keeper_session_));
+  HULLD_RETURN_IF_ERROR(WaitForTurn());
+  HULLD_RETURN_IF_ERROR(options_.shared ? MakeSharedSchema(*keeper_session_)
+                                        : MakeSchema(*keeper_session_));
+  return BeginPatiently();
 }
 
 // The connection has worked before, so a failure is treated as temporary: for example, the database
@@ -303,7 +307,7 @@ absl::Status PostgresStore::CheckServer(Session& session) {
   HULLD_ASSIGN_OR_RETURN(
       const Rows settings,
       session.Run("SELECT current_setting('synchronous_commit'), current_setting('fsync')"));
-  synchronous_commit_ = std::string(settings.at(0, 0));
+  synchronous_commit_ = options_.migrating ? "on" : std::string(settings.at(0, 0));
   const bool is_sync = synchronous_commit_ != "off" && settings.at(0, 1) == "on";
   durability_ = is_sync ? Durability::kSync : Durability::kRelaxed;
   if (options_.shared && !is_sync) {

@@ -8,7 +8,6 @@
 
 #include "core/base/status_macros.h"
 #include "server/store/postgres/postgres_store.h"
-#include "server/store/sealed_hull.h"
 #include "server/store/store_errors.h"
 #include "server/store/store_keys.h"
 
@@ -196,7 +195,7 @@ absl::StatusOr<uint64_t> PostgresStore::LoadSequence(const HullRecord& hull,
   const uint64_t incarnation = hull.create_revision;
   HULLD_ASSIGN_OR_RETURN(
       const Rows rows,
-      ReadOne({.name = options_.shared ? "hulld_sequence_and_record" : "hulld_sequence",
+      ReadOne({.name = "hulld_sequence",
                .parameters = {hull.hull_id, EncodeBigint(incarnation), writer_id}}));
   HULLD_RETURN_IF_ERROR(options_.shared ? CheckRecord(hull, rows) : absl::OkStatus());
   if (rows.count() == 0 || rows.at(0, 0).empty()) return 0;

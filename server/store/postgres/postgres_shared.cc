@@ -11,7 +11,7 @@
 #include "server/process/random_id.h"
 #include "server/store/postgres/batch_statements.h"
 #include "server/store/postgres/postgres_store.h"
-#include "server/store/sealed_hull.h"
+#include "server/store/store_keys.h"
 
 namespace hulld::server {
 namespace {
@@ -62,12 +62,7 @@ constexpr char kPrepareFetch[] = R"(
         FROM hulld.changes WHERE batch > $1 GROUP BY id LIMIT $2) c ON true
       LEFT JOIN hulld.hulls h ON h.hull_id = c.id
       LEFT JOIN hulld.bodies b ON b.body_id = c.id;
-    PREPARE hulld_record(text) AS SELECT record FROM hulld.hulls WHERE hull_id = $1;
-    PREPARE hulld_sequence_and_record(text, bigint, text) AS
-      SELECT w.sequence, h.record FROM hulld.hulls h
-      LEFT JOIN hulld.writers w
-        ON w.hull_id = h.hull_id AND w.incarnation = $2 AND w.writer_id = $3
-      WHERE h.hull_id = $1;)";
+    PREPARE hulld_record(text) AS SELECT record FROM hulld.hulls WHERE hull_id = $1;)";
 
 constexpr char kPrepareShared[] = R"(
     PREPARE hulld_join(text) AS
@@ -288,10 +283,7 @@ absl::Status PostgresStore::Fetch() {
 
 // Takes the turn before writing a batch, and reads the preceding changes by peer servers.
 absl::Status PostgresStore::TakeTurn() {
-  std::vector<Statement> turn;
-  turn.push_back({.text = "BEGIN"});
-  turn.push_back({.name = "hulld_turn"});
-  turn.push_back(FetchStatement(batch_));
+  const Statement turn[] = {{.text = "BEGIN"}, {.name = "hulld_turn"}, FetchStatement(batch_)};
   const absl::StatusOr<std::vector<Rows>> rows = writer_->Ask(turn);
   return rows.ok() ? NotePeerChanges(rows->back()) : rows.status();
 }
@@ -342,11 +334,10 @@ void PostgresStore::GiveNewId() {
 // The sync of this transaction covers earlier commits.
 absl::StatusOr<bool> PostgresStore::SharedOutcome(uint64_t batch) {
   HULLD_RETURN_IF_ERROR(RenewWriter());
-  std::vector<Statement> statements;
-  statements.push_back({.text = "BEGIN"});
-  statements.push_back({.name = "hulld_touch", .parameters = {EncodeBigint(epoch())}});
-  statements.push_back({.name = "hulld_server", .parameters = {owner_}});
-  statements.push_back({.text = "COMMIT"});
+  const Statement statements[] = {{.text = "BEGIN"},
+                                  {.name = "hulld_touch", .parameters = {EncodeBigint(epoch())}},
+                                  {.name = "hulld_server", .parameters = {owner_}},
+                                  {.text = "COMMIT"}};
   HULLD_ASSIGN_OR_RETURN(const std::vector<Rows> rows, writer_->AskToCommit(statements));
   const Rows& last = rows[2];
   return last.count() == 1 && last.bigint(0, 0) == batch;
@@ -401,7 +392,7 @@ void PostgresStore::OnPeerCommit(std::function<void()> committed) {
   on_peer_commit_ = std::move(committed);
 }
 
-// Compares the hull's record with `hull`, as of a sequence. rows: of hulld_sequence_and_record.
+// Compares the hull's record with `hull`, as of a sequence. rows: of hulld_sequence.
 absl::Status PostgresStore::CheckRecord(const HullRecord& hull, const Rows& rows) {
   if (rows.count() == 0) return Moved();
   HULLD_ASSIGN_OR_RETURN(const StoredHull now, UnsealStoredHull(hull.hull_id, rows.at(0, 1)));

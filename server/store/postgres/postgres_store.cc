@@ -81,10 +81,8 @@ Statement PostgresStore::Fence(const Batch& batch) const {
 // was not. batch: set before anything is sent that may commit it.
 absl::Status PostgresStore::Attempt(std::span<Change* const> changes, Batch* batch) {
   *batch = {batch_ + 1, NumberChanges(changes, revision_), AddedBy(changes)};
-  std::vector<Statement> statements;
-  statements.push_back({.text = "BEGIN"});
-  // Runs first, so that a superseded server writes nothing.
-  statements.push_back(Fence(*batch));
+  // The fence runs first, so that a superseded server writes nothing.
+  std::vector<Statement> statements = {{.text = "BEGIN"}, Fence(*batch)};
   std::ranges::move(StatementsOf(changes), std::back_inserter(statements));
   return SendBatch(std::move(statements), *batch);
 }

@@ -19,9 +19,7 @@
 #include <vector>
 
 #include "server/store/postgres/batch_notices.h"
-#include "server/store/postgres/conninfo.h"
 #include "server/store/postgres/session.h"
-#include "server/store/postgres/session_pool.h"
 #include "server/store/store.h"
 
 namespace hulld::server {
@@ -38,7 +36,8 @@ struct PostgresOptions {
   std::string conninfo;
   // Replaces the active server instead of waiting for it to exit.
   bool take_over = false;
-  // Also opens a store with an unfinished migration.
+  // Also opens a store with an unfinished migration. Commits are on disk, regardless of the role's
+  // default.
   bool migrating = false;
   // Opens only a database that contains a store.
   bool must_exist = false;
@@ -142,6 +141,13 @@ class PostgresStore : public Store, public PeerFeed {
   // The epoch of this server, which only grows.
   uint64_t epoch() const { return epoch_.load(); }
 
+  // For a migration: the session of commits, and the statement of a transaction that commits
+  // nothing else than `added`, the change of the totals, and this revision.
+  Session& writer() { return *writer_; }
+  Statement Fence(uint64_t revision, const StoreTotals& added) const {
+    return Fence({batch_, revision, added});
+  }
+
  private:
   // Owner of a shared store.
   static constexpr char kSeveralServers[] = "several servers";
@@ -164,7 +170,8 @@ class PostgresStore : public Store, public PeerFeed {
   absl::StatusOr<std::unique_ptr<Session>> OpenKeeper() const;
   absl::StatusOr<std::unique_ptr<Session>> OpenListener() const;
 
-  // Steps of opening, in this order.
+  // Opens the store by the following steps, in this order.
+  absl::Status BecomeActive();
   absl::Status CheckServer(Session& session);
   absl::Status WaitForTurn();
   absl::Status MakeSchema(Session& session);

@@ -49,7 +49,71 @@ bool IsError(const PGresult* result) {
   }
 }
 
+// Defaults for missing keywords. Times in seconds, TCP's in milliseconds; a choice: longer than a
+// network glitch, shorter than an operator's patience.
+constexpr struct {
+  const char* keyword;
+  const char* value;
+} kDefaults[] = {
+    {"fallback_application_name", "hulld"},
+    {"client_encoding", "UTF8"},
+    {"connect_timeout", "5"},
+    {"keepalives_idle", "5"},
+    {"keepalives_interval", "2"},
+    {"keepalives_count", "3"},
+    {"tcp_user_timeout", "10000"},
+    {"target_session_attrs", "read-write"},
+};
+
 }  // namespace
+
+absl::StatusOr<Conninfo> ParseConninfo(const std::string& text) {
+  const std::string trimmed(absl::StripAsciiWhitespace(text));
+  if (trimmed.empty()) return absl::InvalidArgumentError("it is empty");
+  // libpq's message would quote the text.
+  char* words = nullptr;
+  const std::unique_ptr<PQconninfoOption, decltype(&PQconninfoFree)> options(
+      PQconninfoParse(trimmed.c_str(), &words), PQconninfoFree);
+  PQfreemem(words);
+  if (options == nullptr) {
+    return absl::InvalidArgumentError(
+        "it is not a libpq connection string, such as 'host=db.example dbname=hulld user=hulld "
+        "password=...' (a value with spaces in single quotes) or "
+        "'postgresql://hulld@db.example/hulld'");
+  }
+  Conninfo conninfo;
+  for (const PQconninfoOption* option = options.get(); option->keyword != nullptr; ++option) {
+    if (option->val != nullptr) conninfo[option->keyword] = option->val;
+  }
+  for (const auto& [keyword, value] : kDefaults) conninfo.emplace(keyword, value);
+  const auto holds = [&](const char* keyword, const char* forbidden, bool only) {
+    const auto found = conninfo.find(keyword);
+    if (found == conninfo.end()) return false;
+    return (only ? found->second.find_first_not_of(forbidden)
+                 : found->second.find_first_of(forbidden)) != std::string::npos;
+  };
+  if (holds("host", "@", false) || holds("dbname", "@", false) ||
+      holds("port", "0123456789,", true)) {
+    return absl::InvalidArgumentError(
+        "its host or database contains an @, or its port is not a number; in the password of a "
+        "URI, write @ as %40 and / as %2F");
+  }
+  return conninfo;
+}
+
+void ArrayParameter::Add(std::string_view value) {
+  ++count_;
+  elements_ += EncodeInteger(static_cast<uint32_t>(value.size()));
+  elements_ += value;
+}
+
+// Header: number of dimensions, null flag, element type; then, per dimension, its length and its
+// first index. Source: array_recv in PostgreSQL's utils/adt/arrayfuncs.c.
+std::string ArrayParameter::Take() {
+  return absl::StrCat(
+      EncodeInteger(1), EncodeInteger(0), EncodeInteger(static_cast<uint32_t>(element_)),
+      EncodeInteger(std::exchange(count_, 0)), EncodeInteger(1), std::exchange(elements_, {}));
+}
 
 bool IsLost(const absl::Status& status) { return status.GetPayload(kLostPayload).has_value(); }
 
@@ -63,7 +127,7 @@ absl::StatusOr<std::unique_ptr<Session>> Session::Open(const Conninfo& conninfo,
                                                        std::chrono::milliseconds answer_time) {
   std::vector<const char*> keywords;
   std::vector<const char*> values;
-  for (const auto& [keyword, value] : conninfo.parameters()) {
+  for (const auto& [keyword, value] : conninfo) {
     keywords.push_back(keyword.c_str());
     values.push_back(value.c_str());
   }
@@ -251,6 +315,68 @@ absl::StatusOr<std::vector<Rows>> Session::AskToCommit(std::span<const Statement
   absl::StatusOr<std::vector<Rows>> rows = Ask(statements);
   if (rows.ok() && warned_) return Lost("PostgreSQL reported a warning during COMMIT");
   return rows;
+}
+
+absl::StatusOr<std::vector<Rows>> SessionPool::Ask(std::span<const Statement> statements) {
+  HULLD_ASSIGN_OR_RETURN(std::unique_ptr<Session> session, Take(false));
+  // Finish reports a lost session.
+  session->Start(statements).IgnoreError();
+  return Finish(std::move(session), statements);
+}
+
+std::unique_ptr<Session> SessionPool::TryStart(std::span<const Statement> statements) {
+  std::unique_ptr<Session> session;
+  {
+    const std::lock_guard lock(mutex_);
+    if (idle_.empty() || taken_ == most_) return nullptr;
+    ++taken_;
+    session = std::move(idle_.back());
+    idle_.pop_back();
+  }
+  session->Start(statements).IgnoreError();
+  return session;
+}
+
+absl::StatusOr<std::vector<Rows>> SessionPool::Finish(std::unique_ptr<Session> session,
+                                                      std::span<const Statement> statements) {
+  absl::StatusOr<std::vector<Rows>> rows = session->Finish();
+  for (const bool again : {true, false}) {
+    const bool is_lost = IsLost(rows.status());
+    GiveBack(is_lost ? nullptr : std::move(session));
+    if (!is_lost || !again) break;
+    HULLD_ASSIGN_OR_RETURN(session, Take(true));
+    rows = session->Ask(statements);
+  }
+  return rows;
+}
+
+// fresh: drops idle sessions, which are as old as one that was lost.
+absl::StatusOr<std::unique_ptr<Session>> SessionPool::Take(bool fresh) {
+  std::vector<std::unique_ptr<Session>> old;
+  {
+    std::unique_lock lock(mutex_);
+    free_.wait(lock, [this] { return taken_ < most_; });
+    ++taken_;
+    if (fresh) old.swap(idle_);
+    if (!idle_.empty()) {
+      std::unique_ptr<Session> session = std::move(idle_.back());
+      idle_.pop_back();
+      return session;
+    }
+  }
+  absl::StatusOr<std::unique_ptr<Session>> session = open_();
+  if (!session.ok()) GiveBack(nullptr);
+  return session;
+}
+
+// session: null if it is lost.
+void SessionPool::GiveBack(std::unique_ptr<Session> session) {
+  {
+    const std::lock_guard lock(mutex_);
+    --taken_;
+    if (session != nullptr) idle_.push_back(std::move(session));
+  }
+  free_.notify_one();
 }
 
 absl::StatusOr<uint64_t> OnlyNumber(const absl::StatusOr<Rows>& rows) {

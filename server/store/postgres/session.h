@@ -6,18 +6,65 @@
 #include <libpq-fe.h>
 
 #include <chrono>
+#include <condition_variable>
 #include <cstdint>
+#include <functional>
+#include <map>
 #include <memory>
+#include <mutex>
 #include <span>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
-#include "server/store/postgres/conninfo.h"
-#include "server/store/postgres/parameters.h"
+#include "server/store/store_keys.h"
 
 namespace hulld::server {
+
+// Connection parameters of a database by keyword, for PQconnectdbParams. They may include
+// passwords, so no error or log line quotes the text; libpq's own errors name host, port, user and
+// database.
+using Conninfo = std::map<std::string, std::string>;
+
+// text: a connection string of libpq, keywords with values or a URI. Missing keywords get defaults
+// that bound the wait for an unreachable machine and select a writable server. INVALID_ARGUMENT,
+// without quoting the text: it is not a connection string, or a password in it ends early, so that
+// its rest would be parsed as a host or a database.
+absl::StatusOr<Conninfo> ParseConninfo(const std::string& text);
+
+// Encodes a bigint in PostgreSQL's binary format. Revisions and other numbers stay below 2^63.
+inline std::string EncodeBigint(uint64_t number) { return BigEndian(number); }
+inline uint64_t DecodeBigint(std::string_view bytes) { return FromBigEndian(bytes); }
+// Encodes an integer likewise.
+inline std::string EncodeInteger(uint32_t number) { return BigEndian(number); }
+
+// A one-dimensional array in PostgreSQL's binary format.
+class ArrayParameter {
+ public:
+  enum class Element : uint32_t { kBytea = 17, kBigint = 20, kInteger = 23, kText = 25 };
+
+  explicit ArrayParameter(Element element) : element_(element) {}
+  // value: the element in binary format.
+  void Add(std::string_view value);
+  uint32_t count() const { return count_; }
+  size_t bytes() const { return elements_.size(); }
+  // Returns the array and clears it.
+  std::string Take();
+
+ private:
+  Element element_;
+  uint32_t count_ = 0;
+  std::string elements_;
+};
+
+// A statement: the name of a prepared one, or the text of a statement without parameters.
+struct Statement {
+  const char* name = nullptr;
+  const char* text = nullptr;
+  // In binary format.
+  std::vector<std::string> parameters = {};
+};
 
 // Result of a statement.
 class Rows {
@@ -93,6 +140,42 @@ class Session {
   const std::chrono::milliseconds answer_time_;
   absl::Status lost_;
   bool warned_ = false;
+};
+
+// Sessions shared by threads; each is used by one thread at a time. Thread-safe.
+class SessionPool {
+ public:
+  using Opener = std::function<absl::StatusOr<std::unique_ptr<Session>>()>;
+
+  // open: creates a session. most: maximum number of sessions; a thread waits if all are in use.
+  SessionPool(Opener open, int most) : open_(std::move(open)), most_(most) {}
+
+  // Session::Ask on one of the sessions. If it was lost since its last use, for example by a
+  // restart of the database, retries once on a new one.
+  absl::StatusOr<std::vector<Rows>> Ask(std::span<const Statement> statements);
+
+  // The two halves of Ask. TryStart does not block: returns null if no session is idle. A started
+  // query must be finished or dropped, on any thread, before the next one if there is only one
+  // session.
+  std::unique_ptr<Session> TryStart(std::span<const Statement> statements);
+  // statements: as passed to TryStart.
+  absl::StatusOr<std::vector<Rows>> Finish(std::unique_ptr<Session> session,
+                                           std::span<const Statement> statements);
+  void GiveUp(std::unique_ptr<Session> session) {
+    if (session != nullptr) GiveBack(nullptr);
+  }
+
+ private:
+  absl::StatusOr<std::unique_ptr<Session>> Take(bool fresh);
+  void GiveBack(std::unique_ptr<Session> session);
+
+  const Opener open_;
+  const int most_;
+  std::mutex mutex_;
+  std::condition_variable free_;
+  // Guarded by mutex_.
+  std::vector<std::unique_ptr<Session>> idle_;
+  int taken_ = 0;
 };
 
 // Returns the number in the only row of a query about the store. DATA_LOSS: the row is missing.

@@ -75,7 +75,7 @@ class ManyHulls {
       replacement.builder = std::make_shared<HullBuilder>();
       replacement.counts = *replacement.builder->Add(Box(static_cast<int>(i)));
       std::promise<bool> created;
-      registry_.hulls().Replace(
+      registry_.changes().Replace(
           std::move(replacement),
           [&](const absl::StatusOr<PutHullResult>& result) { created.set_value(result.ok()); });
       if (!created.get_future().get()) std::abort();
@@ -99,16 +99,16 @@ class ManyHulls {
     const double start = ProcessorSeconds();
     for (const std::string& id : ids_) {
       std::promise<absl::StatusOr<OpenResult>> opened;
-      registry_.hulls().OpenAppend(
+      registry_.changes().OpenAppend(
           id, "writer", false, [](const absl::Status&) {},
           [&](absl::StatusOr<OpenResult> result) { opened.set_value(std::move(result)); });
       const absl::StatusOr<OpenResult> open = opened.get_future().get();
       std::promise<bool> added;
-      registry_.hulls().Append(
+      registry_.changes().Append(
           open->session, {1, {{1e6, 0, 0}}, std::nullopt}, {}, {},
           [&](const absl::StatusOr<ChunkResult>& result) { added.set_value(result.ok()); });
       if (!added.get_future().get()) std::abort();
-      registry_.hulls().CloseAppend(open->session);
+      registry_.changes().CloseAppend(open->session);
     }
     Print("append", start);
   }

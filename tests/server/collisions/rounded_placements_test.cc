@@ -13,7 +13,7 @@
 #include "client/client.h"
 #include "client/packed_placements.h"
 #include "client/verify/answer_check.h"
-#include "server/store/body_record.h"
+#include "server/store/records.h"
 #include "tests/server/collisions/watch_round.h"
 #include "tests/server/harness/test_server.h"
 

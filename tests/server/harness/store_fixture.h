@@ -42,25 +42,26 @@ class TestRegistry {
 
   absl::StatusOr<PutHullResult> Create(const std::string& id, bool if_absent = false) {
     return Wait<PutHullResult>([&](Reply<PutHullResult> done) {
-      registry_.hulls().Create(id, if_absent, std::move(done));
+      registry_.changes().Create(id, if_absent, std::move(done));
     });
   }
   absl::StatusOr<uint64_t> Delete(const std::string& id) {
-    return Wait<uint64_t>(
-        [&](Reply<uint64_t> done) { registry_.hulls().Delete(id, std::nullopt, std::move(done)); });
+    return Wait<uint64_t>([&](Reply<uint64_t> done) {
+      registry_.changes().Delete("hull", id, std::nullopt, std::move(done));
+    });
   }
   absl::StatusOr<OpenResult> Open(const std::string& id, const std::string& writer = "w",
                                   bool create_if_absent = true) {
     return Wait<OpenResult>([&](Reply<OpenResult> done) {
-      registry_.hulls().OpenAppend(
+      registry_.changes().OpenAppend(
           id, writer, create_if_absent, [](const absl::Status&) {}, std::move(done));
     });
   }
   absl::StatusOr<ChunkResult> Append(const AppendSession& session, uint64_t sequence,
                                      std::vector<Vector> points) {
     return Wait<ChunkResult>([&](Reply<ChunkResult> done) {
-      registry_.hulls().Append(session, {sequence, std::move(points), std::nullopt}, {}, {},
-                               std::move(done));
+      registry_.changes().Append(session, {sequence, std::move(points), std::nullopt}, {}, {},
+                                 std::move(done));
     });
   }
   // Sends one chunk in its own session.
@@ -70,12 +71,12 @@ class TestRegistry {
     if (!opened.ok()) return opened.status();
     absl::StatusOr<ChunkResult> result =
         Append(opened->session, opened->last_sequence + 1, std::move(points));
-    registry_.hulls().CloseAppend(opened->session);
+    registry_.changes().CloseAppend(opened->session);
     return result;
   }
   absl::StatusOr<PutHullResult> Replace(Replacement replacement) {
     return Wait<PutHullResult>([&](Reply<PutHullResult> done) {
-      registry_.hulls().Replace(std::move(replacement), std::move(done));
+      registry_.changes().Replace(std::move(replacement), std::move(done));
     });
   }
   absl::StatusOr<HullView> View(const std::string& id) {

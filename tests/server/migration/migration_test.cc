@@ -10,7 +10,6 @@
 #include <sstream>
 #include <tuple>
 
-#include "server/migration/migrate.h"
 #include "server/store/postgres/postgres_store.h"
 #include "server/store/rocksdb_store.h"
 #include "server/store/store_keys.h"
@@ -147,7 +146,7 @@ class MigrationTest : public ::testing::TestWithParam<std::tuple<const char*, co
     // Concurrently, so that they are committed together.
     std::latch created(kMany);
     for (int i = 0; i < kMany; ++i) {
-      hulls->registry().hulls().Create(absl::StrCat("many/", i), false, [&](const auto& result) {
+      hulls->registry().changes().Create(absl::StrCat("many/", i), false, [&](const auto& result) {
         EXPECT_TRUE(result.ok()) << result.status();
         created.count_down();
       });
@@ -160,7 +159,7 @@ class MigrationTest : public ::testing::TestWithParam<std::tuple<const char*, co
     body.hull_ids = {"grown", "empty"};
     body.pieces = {{0, Pose()}, {1, Pose()}, {0, {.q = {1, 0, 0.5, 0}, .t = {0.1, -0.0, 3}}}};
     const auto put = AnyRegistry::Wait<PutBodyResult>([&](Reply<PutBodyResult> done) {
-      hulls.registry().bodies().Put(body, {}, std::move(done));
+      hulls.registry().changes().PutBody(body, {}, std::move(done));
     });
     ASSERT_TRUE(put.ok()) << put.status();
   }

@@ -30,7 +30,7 @@ class RegistryChaos : public RegistryInterleaving {
     for (uint64_t i = 0; i < times; ++i) {
       if (!session.has_value()) {
         const auto opened = DurableRegistry::Wait<OpenResult>([&](Reply<OpenResult> done) {
-          registry_.hulls().OpenAppend(
+          registry_.changes().OpenAppend(
               id, "w", true, [](const absl::Status&) {}, std::move(done));
         });
         if (!opened.ok()) continue;
@@ -41,7 +41,7 @@ class RegistryChaos : public RegistryInterleaving {
       const HullView view = registry_.Resolve(id, {})->second;
       EXPECT_EQ(view.record.counts.received, sequence);
       if (random() % 100 == 0 && Delete(id).ok()) {
-        registry_.hulls().CloseAppend(*session);
+        registry_.changes().CloseAppend(*session);
         session.reset();
       }
     }

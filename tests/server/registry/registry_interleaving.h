@@ -158,7 +158,7 @@ class RegistryInterleaving : public ::testing::Test {
   }
   OpenResult OpenResultOf(const std::string& id, const std::string& writer) {
     return *DurableRegistry::Wait<OpenResult>([&](Reply<OpenResult> done) {
-      registry_.hulls().OpenAppend(
+      registry_.changes().OpenAppend(
           id, writer, true, [](const absl::Status&) {}, std::move(done));
     });
   }
@@ -167,7 +167,7 @@ class RegistryInterleaving : public ::testing::Test {
                                                        std::vector<Vector> points,
                                                        std::function<void()> on_built = {}) {
     const auto promise = std::make_shared<std::promise<absl::StatusOr<ChunkResult>>>();
-    registry_.hulls().Append(
+    registry_.changes().Append(
         session, {sequence, std::move(points), std::nullopt}, {}, std::move(on_built),
         [promise](absl::StatusOr<ChunkResult> result) { promise->set_value(std::move(result)); });
     return promise->get_future();
@@ -178,8 +178,9 @@ class RegistryInterleaving : public ::testing::Test {
   }
 
   absl::StatusOr<uint64_t> Delete(const std::string& id) {
-    return DurableRegistry::Wait<uint64_t>(
-        [&](Reply<uint64_t> done) { registry_.hulls().Delete(id, std::nullopt, std::move(done)); });
+    return DurableRegistry::Wait<uint64_t>([&](Reply<uint64_t> done) {
+      registry_.changes().Delete("hull", id, std::nullopt, std::move(done));
+    });
   }
   std::future<absl::StatusOr<Resolved>> StartResolve(std::vector<std::string> ids,
                                                      std::function<bool()> should_stop) {

@@ -90,7 +90,7 @@ TEST_F(RegistryInterleaving, ManyHullsAreReadByManyThreads) {
   }
   // Each eviction asks only a few hulls.
   for (int i = 0; i < kHulls; ++i) DropAll();
-  store_.Lose(registry_.List(ids[kLost], "", 1)->entries[0].record);
+  store_.Lose(registry_.records().List(ids[kLost], "", 1)->entries[0].record);
   Gate gate;
   store_.before_load.Set([&] { gate.Stop(); });
   auto reader = StartResolve(ids, {});
@@ -118,9 +118,9 @@ TEST_F(RegistryInterleaving, ManyHullsAreReadByManyThreads) {
   EXPECT_LE(registry_.Holds().max_lookups, kMaxLookupsPerHold);
 }
 
-// The next hulls are read while the first are looked up. Hulls deleted in the interim are not
-// found, and a reader that waits for one is not delayed by a cancelled reader.
-TEST_F(RegistryInterleaving, HullsThatAreReadAheadMayGoOrBeWaitedFor) {
+// Hulls that are deleted while many are read are not found, and a reader that waits for one is not
+// delayed by a cancelled reader.
+TEST_F(RegistryInterleaving, HullsThatAreReadTogetherMayGoOrBeWaitedFor) {
   constexpr int kHulls = 300;
   std::vector<std::string> ids;
   for (int i = 0; i < kHulls; ++i) {
@@ -287,7 +287,7 @@ TEST_F(RegistryInterleaving, AHullThatIsReplacedWhileItIsReadIsTheNewOne) {
   replacement.builder = std::make_shared<HullBuilder>();
   replacement.counts = *replacement.builder->Add(CubeCorners(5, 1));
   ASSERT_TRUE(DurableRegistry::Wait<PutHullResult>([&](Reply<PutHullResult> done) {
-                registry_.hulls().Replace(std::move(replacement), std::move(done));
+                registry_.changes().Replace(std::move(replacement), std::move(done));
               }).ok());
   gate.Open();
   const auto resolved = reader.get();
@@ -299,7 +299,7 @@ TEST_F(RegistryInterleaving, PointsThatTheStoreLostAreDamageForReadersAndWriters
   const AppendSession session = Open("h", "w");
   ASSERT_TRUE(Append(session, 1, CubeCorners()).ok());
   DropAll();
-  store_.Lose(registry_.List("", "", 1)->entries[0].record);
+  store_.Lose(registry_.records().List("", "", 1)->entries[0].record);
   EXPECT_TRUE(absl::IsDataLoss(registry_.Resolve("h", {}).status()));
   EXPECT_TRUE(absl::IsDataLoss(Append(session, 2, {{9, 9, 9}}).status()));
   EXPECT_EQ(registry_.Cache().damaged, 1);
@@ -311,7 +311,7 @@ TEST_F(RegistryInterleaving, PointsOfAnotherDimensionAreDamage) {
   const AppendSession session = Open("h", "w");
   ASSERT_TRUE(Append(session, 1, CubeCorners()).ok());
   DropAll();
-  store_.Flatten(registry_.List("", "", 1)->entries[0].record);
+  store_.Flatten(registry_.records().List("", "", 1)->entries[0].record);
   EXPECT_TRUE(absl::IsDataLoss(registry_.Resolve("h", {}).status()));
   EXPECT_TRUE(absl::IsDataLoss(Append(session, 2, {{9, 9, 9}}).status()));
 }
@@ -338,19 +338,19 @@ TEST_F(RegistryInterleaving, PointsThatMakeAnotherHullAreDamage) {
 TEST_F(RegistryInterleaving, ASequenceThatIsReadWhileAnotherIsCommittedIsTheNewer) {
   const AppendSession first = Open("h", "w");
   ASSERT_TRUE(Append(first, 1, {{0, 0, 0}}).ok());
-  registry_.hulls().CloseAppend(first);
+  registry_.changes().CloseAppend(first);
   store_.after_load_sequence.Set([this] {
     const OpenResult other = OpenResultOf("h", "w");
     EXPECT_EQ(other.last_sequence, 1);
     EXPECT_TRUE(Append(other.session, 2, {{1, 0, 0}}).ok());
-    registry_.hulls().CloseAppend(other.session);
+    registry_.changes().CloseAppend(other.session);
   });
   const OpenResult opened = OpenResultOf("h", "w");
   EXPECT_EQ(opened.last_sequence, 2);
   const absl::StatusOr<ChunkResult> repeated = Append(opened.session, 2, {{1, 0, 0}});
   ASSERT_TRUE(repeated.ok()) << repeated.status();
   EXPECT_TRUE(repeated->already_applied);
-  registry_.hulls().CloseAppend(opened.session);
+  registry_.changes().CloseAppend(opened.session);
 }
 
 // The chunk is queued on a thread, not yet started, when the batch before it fails. The store has
@@ -358,14 +358,14 @@ TEST_F(RegistryInterleaving, ASequenceThatIsReadWhileAnotherIsCommittedIsTheNewe
 TEST_F(RegistryInterleaving, ASequenceThatADeletionTookAwayIsNotThatOfTheHull) {
   const OpenResult first = OpenResultOf("h", "w");
   ASSERT_TRUE(Append(first.session, 1, CubeCorners()).ok());
-  registry_.hulls().CloseAppend(first.session);
+  registry_.changes().CloseAppend(first.session);
   // One of two threads is busy, so tasks submitted after the opening run after it.
   Gate busy, reads, committed;
   writers_.Submit([&] { busy.Stop(); });
   busy.WaitUntilReached();
   store_.before_load_sequence.Set([&] { reads.Stop(); });
   std::promise<absl::StatusOr<OpenResult>> opened;
-  registry_.hulls().OpenAppend(
+  registry_.changes().OpenAppend(
       "h", "w", true, [](const absl::Status&) {},
       [&](absl::StatusOr<OpenResult> result) { opened.set_value(std::move(result)); });
   reads.WaitUntilReached();

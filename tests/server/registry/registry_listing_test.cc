@@ -90,14 +90,14 @@ TEST(RegistryListing, InsidePointsInFlightAreSeenByAllReadsOrNone) {
     store.Hold(false);
     return false;
   };
-  const absl::StatusOr<RecordPage> page = registry.List("", "", 10, release);
+  const absl::StatusOr<RecordPage> page = registry.records().List("", "", 10, release);
   const absl::StatusOr<HullView> view = hulls.View("h");
   store.Hold(false);
   ASSERT_TRUE(page.ok() && view.ok());
   ASSERT_EQ(page->entries.size(), 1);
   EXPECT_LE(page->entries[0].record.counts.received, view->record.counts.received);
   EXPECT_TRUE(appended.get().ok());
-  hulls.registry().hulls().CloseAppend(writer->session);
+  hulls.registry().changes().CloseAppend(writer->session);
 }
 
 }  // namespace registry_listing_test

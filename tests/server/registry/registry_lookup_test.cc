@@ -158,11 +158,11 @@ TEST_F(RegistryLookup, ARefreshAfterMoreChangesThanAreKnownLooksUpAll) {
   const AppendSession session = hulls_.Open("another")->session;
   std::promise<void> done;
   for (uint64_t sequence = 1; sequence <= RecentChanges::kCapacity; ++sequence) {
-    registry_.hulls().Append(session, {sequence, {{0, 0, 0}}, std::nullopt}, {}, {},
-                             [&, sequence](const absl::StatusOr<ChunkResult>& result) {
-                               EXPECT_TRUE(result.ok());
-                               if (sequence == RecentChanges::kCapacity) done.set_value();
-                             });
+    registry_.changes().Append(session, {sequence, {{0, 0, 0}}, std::nullopt}, {}, {},
+                               [&, sequence](const absl::StatusOr<ChunkResult>& result) {
+                                 EXPECT_TRUE(result.ok());
+                                 if (sequence == RecentChanges::kCapacity) done.set_value();
+                               });
   }
   done.get_future().wait();
   const uint64_t before = Lookups();

@@ -21,7 +21,7 @@ TEST_F(RegistryMemory, HullsAreReadAtFirstUse) {
   for (int i = 0; i < 10; ++i) ASSERT_TRUE(hulls_->Put(std::to_string(i), CubeCorners()).ok());
   Start();
   EXPECT_EQ(hulls_->registry().Cache().bytes, 0);
-  EXPECT_EQ(hulls_->registry().List("", "", 100)->entries.size(), 10);
+  EXPECT_EQ(hulls_->registry().records().List("", "", 100)->entries.size(), 10);
   EXPECT_EQ(hulls_->registry().Cache().loads, 0);
   ASSERT_TRUE(hulls_->View("3").ok());
   EXPECT_EQ(hulls_->registry().Cache().loads, 1);
@@ -213,12 +213,12 @@ TEST(RegistryOfMemoryStore, RefusesToGrowBeyondTheLimit) {
   Registry registry(store, limits, writers);
   const auto put = [&](const std::string& id) {
     const auto opened = DurableRegistry::Wait<OpenResult>([&](Reply<OpenResult> done) {
-      registry.hulls().OpenAppend(
+      registry.changes().OpenAppend(
           id, "w", true, [](const absl::Status&) {}, std::move(done));
     });
     return DurableRegistry::Wait<ChunkResult>([&](Reply<ChunkResult> done) {
-      registry.hulls().Append(opened->session, {1, SpherePoints(1000), std::nullopt}, {}, {},
-                              std::move(done));
+      registry.changes().Append(opened->session, {1, SpherePoints(1000), std::nullopt}, {}, {},
+                                std::move(done));
     });
   };
   ASSERT_TRUE(put("first").ok());
@@ -234,7 +234,7 @@ TEST(RegistryOfMemoryStore, PointsThatWaitCount) {
   TaskPool writers(2);
   Registry registry(store, Limits(), writers);
   const auto opened = DurableRegistry::Wait<OpenResult>([&](Reply<OpenResult> done) {
-    registry.hulls().OpenAppend(
+    registry.changes().OpenAppend(
         "h", "w", true, [](const absl::Status&) {}, std::move(done));
   });
   std::vector<Vector> line;
@@ -249,15 +249,15 @@ TEST(RegistryOfMemoryStore, PointsThatWaitCount) {
     if (std::exchange(asked, true)) return false;
     const uint64_t before = registry.Cache().bytes;
     EXPECT_EQ(before, line_bytes);
-    registry.hulls().Append(
+    registry.changes().Append(
         opened->session, {2, waiting, std::nullopt}, {}, {},
         [&](absl::StatusOr<ChunkResult> result) { next.set_value(std::move(result)); });
     EXPECT_EQ(registry.Cache().bytes, before + waiting.size() * sizeof(Vector));
     return false;
   };
   const auto first = DurableRegistry::Wait<ChunkResult>([&](Reply<ChunkResult> done) {
-    registry.hulls().Append(opened->session, {1, line, std::nullopt}, should_stop, {},
-                            std::move(done));
+    registry.changes().Append(opened->session, {1, line, std::nullopt}, should_stop, {},
+                              std::move(done));
   });
   EXPECT_TRUE(first.ok());
   EXPECT_TRUE(asked);
@@ -279,14 +279,14 @@ TEST(RegistryOfMemoryStore, PointsThatAreRefusedCountNoMore) {
   limits.memory_limit = 10'000;
   Registry registry(store, limits, writers);
   const auto opened = DurableRegistry::Wait<OpenResult>([&](Reply<OpenResult> done) {
-    registry.hulls().OpenAppend(
+    registry.changes().OpenAppend(
         "h", "w", true, [](const absl::Status&) {}, std::move(done));
   });
   const auto append = [&](size_t points) {
     return DurableRegistry::Wait<ChunkResult>([&](Reply<ChunkResult> done) {
-      registry.hulls().Append(opened->session,
-                              {1, std::vector<Vector>(points, Vector(1, 2, 3)), {}}, {}, {},
-                              std::move(done));
+      registry.changes().Append(opened->session,
+                                {1, std::vector<Vector>(points, Vector(1, 2, 3)), {}}, {}, {},
+                                std::move(done));
     });
   };
   EXPECT_EQ(append(1000).status().code(), absl::StatusCode::kResourceExhausted);
@@ -465,7 +465,7 @@ TEST(RegistryOfMemoryStore, ASmallHullHasABuilderOnlyWhileASessionIsOpen) {
   ASSERT_TRUE(hulls.Append(opened->session, 1, {{2, 0, 0}}).ok());
   live.Append(std::vector<Vector>{{2, 0, 0}}, 3);
   EXPECT_GT(bytes(), live.MemoryBytes() + HullBuilder().MemoryBytes());
-  hulls.registry().hulls().CloseAppend(opened->session);
+  hulls.registry().changes().CloseAppend(opened->session);
   EXPECT_EQ(bytes(), live.MemoryBytes());
   // The next session continues from there.
   EXPECT_EQ(hulls.Put("h", {{3, 0, 0}, {0, 0, 0}})->counts, (PointCounts{2, 1, 1, 0}));
@@ -481,7 +481,7 @@ TEST(RegistryOfMemoryStore, AnIdleHullComesBackAsItWas) {
   // Threads of the last change may hold the hull a little longer.
   while (registry.Cache().bytes >= awake / 2) registry.RestIdleHulls();
   EXPECT_GE(registry.Cache().writing_bytes, 9 * sizeof(Vector));
-  EXPECT_EQ(registry.List("", "", 10)->entries.front().record, record);
+  EXPECT_EQ(registry.records().List("", "", 10)->entries.front().record, record);
   const HullView view = *hulls.View("h");
   EXPECT_EQ(view.record, record);
   EXPECT_EQ(CanonicalOf(view).vertices().size(), record.vertex_count);

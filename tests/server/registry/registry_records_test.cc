@@ -96,7 +96,7 @@ class RegistryRecords : public ::testing::Test {
     return ids;
   }
   void ExpectBodies(const std::vector<std::string>& ids) {
-    const FoundBodies found = registry_.bodies().Find(ids);
+    const FoundBodies found = registry_.records().FindBodies(ids);
     ASSERT_TRUE(found.status.ok()) << found.status;
     ASSERT_EQ(found.bodies.size(), ids.size());
     for (size_t i = 0; i < ids.size(); ++i) {
@@ -193,15 +193,15 @@ TEST_F(RegistryRecords, BodiesAreReadOnceAndManyAtATime) {
 TEST_F(RegistryRecords, MissingBodiesAreCached) {
   Start(1000);
   const std::vector<std::string> ids = {"h1", "b2", "none"};
-  EXPECT_FALSE(registry_.bodies().Find(ids, {}, false).status.ok());
+  EXPECT_FALSE(registry_.records().FindBodies(ids, {}, false).status.ok());
   EXPECT_EQ(store_.questions, 0);
-  const FoundBodies found = registry_.bodies().Find(ids);
+  const FoundBodies found = registry_.records().FindBodies(ids);
   ASSERT_TRUE(found.status.ok()) << found.status;
   EXPECT_EQ(found.bodies[0], nullptr);
   EXPECT_NE(found.bodies[1], nullptr);
   EXPECT_EQ(found.bodies[2], nullptr);
   EXPECT_EQ(store_.questions, 1);
-  EXPECT_TRUE(registry_.bodies().Find(ids, {}, false).status.ok());
+  EXPECT_TRUE(registry_.records().FindBodies(ids, {}, false).status.ok());
   const absl::StatusOr<Resolved> resolved = registry_.Resolve(ids, {});
   ASSERT_TRUE(resolved.ok()) << resolved.status();
   EXPECT_TRUE(resolved->hulls[0].ok());
@@ -231,9 +231,9 @@ TEST_F(RegistryRecords, UnusedBodiesAreBoundedInBytes) {
 TEST_F(RegistryRecords, ABodyThatSomebodyHoldsStaysKnown) {
   Start(1);
   const std::vector<std::string> ids = {"b7"};
-  const FoundBodies held = registry_.bodies().Find(ids);
+  const FoundBodies held = registry_.records().FindBodies(ids);
   for (uint64_t first = 100; first < 1000; first += 10) ExpectBodies(Ids(first, 10, "b"));
-  EXPECT_EQ(registry_.bodies().Find(ids).bodies.front(), held.bodies.front());
+  EXPECT_EQ(registry_.records().FindBodies(ids).bodies.front(), held.bodies.front());
 }
 
 TEST_F(RegistryRecords, ACallMayNameMoreBodiesThanAreKept) {
@@ -246,7 +246,7 @@ TEST_F(RegistryRecords, UnreadableBodiesReportTheCause) {
   ExpectBodies({"b1"});
   store_.is_gone = true;
   const std::vector<std::string> ids = {"b1", "b2"};
-  const FoundBodies found = registry_.bodies().Find(ids);
+  const FoundBodies found = registry_.records().FindBodies(ids);
   EXPECT_TRUE(absl::IsUnavailable(found.status)) << found.status;
   EXPECT_NE(found.bodies[0], nullptr);
   EXPECT_EQ(found.bodies[1], nullptr);
@@ -258,7 +258,8 @@ TEST_F(RegistryRecords, BodiesAreListedPageByPageWithoutBeingKept) {
   Start(1000);
   std::string after;
   for (int i = 0; i < 10; ++i) {
-    const absl::StatusOr<RecordPage> page = registry_.List("b", after, 5, {}, {.bodies = true});
+    const absl::StatusOr<RecordPage> page =
+        registry_.records().List("b", after, 5, {}, {.bodies = true});
     ASSERT_TRUE(page.ok()) << page.status();
     ASSERT_EQ(page->entries.size(), 5);
     EXPECT_TRUE(page->more);
@@ -266,7 +267,7 @@ TEST_F(RegistryRecords, BodiesAreListedPageByPageWithoutBeingKept) {
   }
   EXPECT_EQ(after, "b59");
   EXPECT_EQ(store_.questions, 10);
-  EXPECT_FALSE(registry_.bodies().Find(Ids(10, 1, "b"), {}, false).status.ok());
+  EXPECT_FALSE(registry_.records().FindBodies(Ids(10, 1, "b"), {}, false).status.ok());
 }
 
 // The batch that says so does not wait, although the existing hulls are not read yet.

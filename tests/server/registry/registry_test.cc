@@ -41,15 +41,15 @@ class RegistryTest : public ::testing::Test {
                                      std::vector<Vector> points,
                                      std::function<bool()> should_stop = {}) {
     return Wait<ChunkResult>([&](Reply<ChunkResult> done) {
-      registry_.hulls().Append(session, {sequence, std::move(points), std::nullopt},
-                               std::move(should_stop), {}, std::move(done));
+      registry_.changes().Append(session, {sequence, std::move(points), std::nullopt},
+                                 std::move(should_stop), {}, std::move(done));
     });
   }
 
   absl::StatusOr<OpenResult> OpenAppend(
       const std::string& id, const std::string& writer, std::function<void()> on_gone = [] {}) {
     return Wait<OpenResult>([&](Reply<OpenResult> done) {
-      registry_.hulls().OpenAppend(
+      registry_.changes().OpenAppend(
           id, writer, true, [on_gone](const absl::Status&) { on_gone(); }, std::move(done));
     });
   }
@@ -57,8 +57,9 @@ class RegistryTest : public ::testing::Test {
   AppendSession Open(const std::string& id) { return OpenAppend(id, "w")->session; }
 
   absl::StatusOr<uint64_t> Delete(const std::string& id) {
-    return Wait<uint64_t>(
-        [&](Reply<uint64_t> done) { registry_.hulls().Delete(id, std::nullopt, std::move(done)); });
+    return Wait<uint64_t>([&](Reply<uint64_t> done) {
+      registry_.changes().Delete("hull", id, std::nullopt, std::move(done));
+    });
   }
 
   CountingStore store_;
@@ -109,7 +110,7 @@ TEST(RegistryTurns, ClientsTakeTurnsAtBuildingChunks) {
   Registry registry(store, Limits(), writers);
   const auto open = [&](const std::string& id, ClientId client) {
     std::promise<AppendSession> opened;
-    registry.hulls().OpenAppend(
+    registry.changes().OpenAppend(
         id, "w", true, [](const absl::Status&) {},
         [&](const absl::StatusOr<OpenResult>& result) { opened.set_value(result->session); },
         client);
@@ -128,7 +129,7 @@ TEST(RegistryTurns, ClientsTakeTurnsAtBuildingChunks) {
     const auto ended = std::make_shared<std::promise<void>>();
     ends.push_back(building->get_future());
     ends.push_back(ended->get_future());
-    registry.hulls().Append(
+    registry.changes().Append(
         sessions[i], {1, {{1, 2, 3}}, std::nullopt}, {},
         [&, i, building] {
           {
@@ -160,7 +161,7 @@ TEST_F(RegistryTest, AReaderDoesNotWaitForTheChunkInProgress) {
     EXPECT_TRUE(view.ok());
     EXPECT_EQ(view->second.served->query_hull().point_count(), 1);
     EXPECT_EQ(CanonicalOf(view->second).vertices().size(), 1);
-    EXPECT_EQ(registry_.List("", "", 10)->entries.size(), 1);
+    EXPECT_EQ(registry_.records().List("", "", 10)->entries.size(), 1);
     return false;
   });
   EXPECT_TRUE(result.ok());
@@ -319,11 +320,11 @@ TEST_F(RegistryTest, ADeletionWaitsForTheChunkInProgressAndRefusesTheNext) {
   bool asked = false;
   const auto result = Append(session, 1, std::move(points), [&] {
     if (!std::exchange(asked, true)) {
-      registry_.hulls().Delete("h", std::nullopt,
-                               [&](absl::StatusOr<uint64_t> reply) { deleted.set_value(reply); });
-      registry_.hulls().Append(session, {2, {{0, 1, 0}}, std::nullopt}, {}, {},
-                               [&](absl::StatusOr<ChunkResult> reply) { next.set_value(reply); });
-      EXPECT_EQ(registry_.List("", "", 10)->entries.size(), 1);
+      registry_.changes().Delete("hull", "h", std::nullopt,
+                                 [&](absl::StatusOr<uint64_t> reply) { deleted.set_value(reply); });
+      registry_.changes().Append(session, {2, {{0, 1, 0}}, std::nullopt}, {}, {},
+                                 [&](absl::StatusOr<ChunkResult> reply) { next.set_value(reply); });
+      EXPECT_EQ(registry_.records().List("", "", 10)->entries.size(), 1);
     }
     return false;
   });
@@ -339,11 +340,11 @@ TEST_F(RegistryTest, AWatchIsCalledOnceOnDeletionAndNotAfterClosing) {
   std::atomic<int> open = 0;
   const auto first = OpenAppend("h", "1", [&] { ++closed; });
   const auto second = OpenAppend("h", "2", [&] { ++open; });
-  registry_.hulls().CloseAppend(first->session);
+  registry_.changes().CloseAppend(first->session);
   ASSERT_TRUE(Delete("h").ok());
   EXPECT_EQ(closed, 0);
   EXPECT_EQ(open, 1);
-  registry_.hulls().CloseAppend(second->session);
+  registry_.changes().CloseAppend(second->session);
 }
 
 TEST_F(RegistryTest, TheStoreSeesEveryChange) {
@@ -362,11 +363,11 @@ TEST_F(RegistryTest, ChunksOfOneSessionAreAnsweredInOrderThoughTheyOverlap) {
   std::vector<uint64_t> revisions;
   std::promise<void> all;
   for (uint64_t i = 1; i <= kChunks; ++i) {
-    registry_.hulls().Append(session, {i, {{static_cast<double>(i), 0, 0}}, std::nullopt}, {}, {},
-                             [&](absl::StatusOr<ChunkResult> result) {
-                               revisions.push_back(result.ok() ? result->hull_revision : 0);
-                               if (revisions.size() == kChunks) all.set_value();
-                             });
+    registry_.changes().Append(session, {i, {{static_cast<double>(i), 0, 0}}, std::nullopt}, {}, {},
+                               [&](absl::StatusOr<ChunkResult> result) {
+                                 revisions.push_back(result.ok() ? result->hull_revision : 0);
+                                 if (revisions.size() == kChunks) all.set_value();
+                               });
   }
   all.get_future().wait();
   for (uint64_t i = 0; i < kChunks; ++i) EXPECT_EQ(revisions[i], i + 2);

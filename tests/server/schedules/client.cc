@@ -152,7 +152,7 @@ void Client::Create() {
   };
   Await<PutHullResult>(
       [&](Reply<PutHullResult> done) {
-        simulation_.registry.hulls().Create(HullName(call.hull), if_absent, std::move(done));
+        simulation_.registry.changes().Create(HullName(call.hull), if_absent, std::move(done));
       },
       check);
 }
@@ -175,7 +175,8 @@ void Client::Delete() {
   };
   Await<uint64_t>(
       [&](Reply<uint64_t> done) {
-        simulation_.registry.hulls().Delete(HullName(call.hull), call.if_revision, std::move(done));
+        simulation_.registry.changes().Delete("hull", HullName(call.hull), call.if_revision,
+                                              std::move(done));
       },
       check);
 }
@@ -211,7 +212,7 @@ void Client::Replace() {
   };
   Await<PutHullResult>(
       [&](Reply<PutHullResult> done) {
-        simulation_.registry.hulls().Replace(std::move(replacement), std::move(done));
+        simulation_.registry.changes().Replace(std::move(replacement), std::move(done));
       },
       check);
 }
@@ -223,7 +224,8 @@ void Client::List() {
     if (MayFail(call, fresh, false)) return;
     Fail(call, absl::StrCat("unexpected error: ", fresh.ToString()));
   }
-  const absl::StatusOr<RecordPage> listed_page = simulation_.registry.List("", "", kHulls);
+  const absl::StatusOr<RecordPage> listed_page =
+      simulation_.registry.records().List("", "", kHulls);
   if (!listed_page.ok()) {
     if (MayFail(call, listed_page.status(), false)) return;
     Fail(call, absl::StrCat("unexpected error: ", listed_page.status().ToString()));

@@ -85,7 +85,7 @@ void Client::PutBody() {
   };
   Await<PutBodyResult>(
       [&](Reply<PutBodyResult> done) {
-        simulation_.registry.bodies().Put(std::move(body), call.if_revision, std::move(done));
+        simulation_.registry.changes().PutBody(std::move(body), call.if_revision, std::move(done));
       },
       check);
 }
@@ -107,7 +107,8 @@ void Client::DeleteBody() {
   };
   Await<uint64_t>(
       [&](Reply<uint64_t> done) {
-        simulation_.registry.bodies().Delete(HullName(call.hull), std::nullopt, std::move(done));
+        simulation_.registry.changes().Delete("body", HullName(call.hull), std::nullopt,
+                                              std::move(done));
       },
       check);
 }
@@ -142,7 +143,7 @@ void Client::FindBodies() {
     Fail(call, absl::StrCat("unexpected error: ", fresh.ToString()));
   }
   const bool may_wait = !random().OneIn(3);
-  const FoundBodies found = simulation_.registry.bodies().Find(ids, stop, may_wait);
+  const FoundBodies found = simulation_.registry.records().FindBodies(ids, stop, may_wait);
   if (!may_wait && !found.status.ok()) return;
   ++simulation_.reached.answers;
   if (!found.status.ok()) {
@@ -166,7 +167,7 @@ void Client::ListBodies() {
     Fail(call, absl::StrCat("unexpected error: ", fresh.ToString()));
   }
   const absl::StatusOr<RecordPage> page =
-      simulation_.registry.List("", "", kHulls, {}, {.bodies = true});
+      simulation_.registry.records().List("", "", kHulls, {}, {.bodies = true});
   ++simulation_.reached.answers;
   if (!page.ok()) {
     if (MayFail(call, page.status(), false)) return;

@@ -54,7 +54,7 @@ void Client::AppendStream() {
   }
   CheckOrder(*stream);
   Scheduler::Current().Note("closes a stream into hull", stream->hull, stream->writer);
-  simulation_.registry.hulls().CloseAppend(stream->session);
+  simulation_.registry.changes().CloseAppend(stream->session);
 }
 
 bool Client::OpenStream(const std::shared_ptr<Stream>& stream, bool create_if_absent) {
@@ -74,8 +74,9 @@ bool Client::OpenStream(const std::shared_ptr<Stream>& stream, bool create_if_ab
   };
   Await<OpenResult>(
       [&](Reply<OpenResult> done) {
-        simulation_.registry.hulls().OpenAppend(HullName(stream->hull), WriterName(stream->writer),
-                                                create_if_absent, on_gone, std::move(done));
+        simulation_.registry.changes().OpenAppend(HullName(stream->hull),
+                                                  WriterName(stream->writer), create_if_absent,
+                                                  on_gone, std::move(done));
       },
       check);
   return stream->is_open;
@@ -118,7 +119,7 @@ void Client::SendChunk(const std::shared_ptr<Stream>& stream, uint64_t sequence)
     sent->status = result.status();
     sent->answered.Set();
   };
-  simulation_.registry.hulls().Append(
+  simulation_.registry.changes().Append(
       stream->session,
       {sequence, PointsOf(ChunkPoints(stream->writer, sequence)), call.if_revision}, StopOf(call),
       on_built, done);
@@ -215,7 +216,7 @@ void Client::CheckSequences(size_t hull) {
     stream->hull = hull;
     stream->writer = writer;
     if (!OpenStream(stream, false)) continue;
-    simulation_.registry.hulls().CloseAppend(stream->session);
+    simulation_.registry.changes().CloseAppend(stream->session);
   }
 }
 

@@ -122,7 +122,7 @@ TEST_P(StoreDamage, ADamagedRecordIsReportedByHullAndListed) {
   FillThree();
   Flip(HullKey("b"));
   Start();
-  const RecordPage page = hulls_->registry().List("", "", 10).value();
+  const RecordPage page = hulls_->registry().records().List("", "", 10).value();
   ASSERT_EQ(page.entries.size(), 3);
   EXPECT_FALSE(page.entries[0].damaged);
   EXPECT_TRUE(page.entries[1].damaged);

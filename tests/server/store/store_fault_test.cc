@@ -464,12 +464,12 @@ TEST_F(StoreFault, NoAckPrecedesItsSync) {
         // Several chunks are in flight, so that batches and chains of changes are cut.
         while (in_flight >= 8) std::this_thread::yield();
         ++in_flight;
-        hulls_->registry().hulls().Append(opened->session,
-                                          {sequence, std::move(points), std::nullopt}, {}, {},
-                                          [&, id, sequence](absl::StatusOr<ChunkResult> result) {
-                                            if (result.ok()) acks.Note(id, sequence, *result);
-                                            --in_flight;
-                                          });
+        hulls_->registry().changes().Append(opened->session,
+                                            {sequence, std::move(points), std::nullopt}, {}, {},
+                                            [&, id, sequence](absl::StatusOr<ChunkResult> result) {
+                                              if (result.ok()) acks.Note(id, sequence, *result);
+                                              --in_flight;
+                                            });
       }
       while (in_flight > 0) std::this_thread::yield();
     });

@@ -164,7 +164,7 @@ TEST_P(StoreRecovery, BodiesAreRestoredAndDamagedIndividually) {
     body.pieces.resize(2);
     body.pieces[1].X_BP.t = Vector(x, 0, 0);
     return KeptRegistry::Wait<PutBodyResult>([&](Reply<PutBodyResult> done) {
-      hulls_->registry().bodies().Put(body, std::nullopt, std::move(done));
+      hulls_->registry().changes().PutBody(body, std::nullopt, std::move(done));
     });
   };
   ASSERT_TRUE(put("changed", 1).ok());
@@ -172,7 +172,7 @@ TEST_P(StoreRecovery, BodiesAreRestoredAndDamagedIndividually) {
   ASSERT_TRUE(put("damaged", 3).ok());
   ASSERT_TRUE(put("gone", 4).ok());
   ASSERT_TRUE(KeptRegistry::Wait<uint64_t>([&](Reply<uint64_t> done) {
-                first.registry().bodies().Delete("gone", std::nullopt, std::move(done));
+                first.registry().changes().Delete("body", "gone", std::nullopt, std::move(done));
               }).ok());
   std::string value = kept_->Get(BodyKey("damaged"));
   value[value.size() / 2] ^= 4;
@@ -195,7 +195,7 @@ TEST_P(StoreRecovery, ASessionIsNotifiedThatItsHullWasReplaced) {
   KeptRegistry& hulls = Start();
   std::promise<absl::Status> gone;
   const auto opened = KeptRegistry::Wait<OpenResult>([&](Reply<OpenResult> done) {
-    hulls.registry().hulls().OpenAppend(
+    hulls.registry().changes().OpenAppend(
         "h", "w", true, [&](const absl::Status& reason) { gone.set_value(reason); },
         std::move(done));
   });
@@ -214,7 +214,7 @@ TEST_P(StoreRecovery, ChangesThatWaitTogetherAreCommittedTogether) {
   constexpr int kHulls = 200;
   std::vector<std::promise<absl::StatusOr<PutHullResult>>> replies(kHulls);
   for (int i = 0; i < kHulls; ++i) {
-    hulls.registry().hulls().Create(
+    hulls.registry().changes().Create(
         absl::StrCat("h", i), false,
         [&replies, i](absl::StatusOr<PutHullResult> r) { replies[i].set_value(std::move(r)); });
   }

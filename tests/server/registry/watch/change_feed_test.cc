@@ -129,14 +129,14 @@ class ChangeFeedTest : public ::testing::Test {
   // Puts a single-piece body; its hull need not exist.
   void PutBody(const std::string& id) {
     std::promise<absl::Status> done;
-    registry().bodies().Put({{id, 0, 0}, {"piece"}, {{0, Pose()}}}, std::nullopt,
-                            [&done](const auto& put) { done.set_value(put.status()); });
+    registry().changes().PutBody({{id, 0, 0}, {"piece"}, {{0, Pose()}}}, std::nullopt,
+                                 [&done](const auto& put) { done.set_value(put.status()); });
     ASSERT_TRUE(done.get_future().get().ok());
   }
   void DeleteBody(const std::string& id) {
     std::promise<absl::Status> done;
-    registry().bodies().Delete(id, std::nullopt,
-                               [&done](const auto& deleted) { done.set_value(deleted.status()); });
+    registry().changes().Delete("body", id, std::nullopt,
+                                [&done](const auto& deleted) { done.set_value(deleted.status()); });
     ASSERT_TRUE(done.get_future().get().ok());
   }
 

@@ -10,7 +10,6 @@
 #include <memory>
 #include <semaphore>
 
-#include "server/store/postgres/conninfo.h"
 #include "server/store/postgres/session.h"
 #include "tests/server/harness/postgres/postgres_cluster.h"
 
@@ -45,7 +44,7 @@ TEST(BatchNotices, EndDuringTheResetOfTheWakeup) {
               "CREATE SCHEMA hulld; CREATE TABLE hulld.store (batch bigint); "
               "INSERT INTO hulld.store VALUES (7); GRANT USAGE ON SCHEMA hulld TO hulld; "
               "GRANT SELECT ON hulld.store TO hulld");
-  const absl::StatusOr<Conninfo> conninfo = Conninfo::Parse(cluster.Conninfo(database));
+  const absl::StatusOr<Conninfo> conninfo = ParseConninfo(cluster.Conninfo(database));
   ASSERT_TRUE(conninfo.ok());
   std::binary_semaphore is_reading{0};
   uint64_t heard = 0;

@@ -1,7 +1,7 @@
-#include "server/store/postgres/conninfo.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include "server/store/postgres/session.h"
 
 namespace hulld::server {
 namespace conninfo_test {
@@ -12,20 +12,20 @@ using ::testing::Not;
 TEST(Conninfo, KeywordsAndUrisAreAccepted) {
   for (const char* text : {"host=db.example dbname=hulls user=hulld password='two words'\n",
                            "postgresql://hulld:two%20words@db.example/hulls"}) {
-    const absl::StatusOr<Conninfo> conninfo = Conninfo::Parse(text);
+    const absl::StatusOr<Conninfo> conninfo = ParseConninfo(text);
     ASSERT_TRUE(conninfo.ok()) << conninfo.status();
-    EXPECT_EQ(conninfo->parameters().at("host"), "db.example");
-    EXPECT_EQ(conninfo->parameters().at("dbname"), "hulls");
-    EXPECT_EQ(conninfo->parameters().at("password"), "two words");
+    EXPECT_EQ(conninfo->at("host"), "db.example");
+    EXPECT_EQ(conninfo->at("dbname"), "hulls");
+    EXPECT_EQ(conninfo->at("password"), "two words");
   }
 }
 
 TEST(Conninfo, TimeoutsHaveDefaults) {
-  const auto defaults = Conninfo::Parse("dbname=hulls")->parameters();
+  const auto defaults = *ParseConninfo("dbname=hulls");
   EXPECT_EQ(defaults.at("connect_timeout"), "5");
   EXPECT_EQ(defaults.at("tcp_user_timeout"), "10000");
   EXPECT_EQ(defaults.at("target_session_attrs"), "read-write");
-  const auto given = Conninfo::Parse("dbname=hulls connect_timeout=60")->parameters();
+  const auto given = *ParseConninfo("dbname=hulls connect_timeout=60");
   EXPECT_EQ(given.at("connect_timeout"), "60");
 }
 
@@ -37,11 +37,11 @@ TEST(Conninfo, NoErrorQuotesAPassword) {
         "postgresql://hulld:abc@geheim@db.example/hulls", "postgresql://hulld:geheim/x@db/hulls",
         "postgresql://hulld:12/geheim@db/hulls", "postgresql://hulld:%zzgeheim@db/hulls",
         "geheim=1 host=db", "host=db port=geheim"}) {
-    const absl::Status status = Conninfo::Parse(text).status();
+    const absl::Status status = ParseConninfo(text).status();
     EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument) << text;
     EXPECT_THAT(std::string(status.message()), Not(HasSubstr("geheim"))) << text;
   }
-  EXPECT_EQ(Conninfo::Parse(" \n").status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(ParseConninfo(" \n").status().code(), absl::StatusCode::kInvalidArgument);
 }
 
 }  // namespace conninfo_test

@@ -179,7 +179,7 @@ TEST_F(PostgresFollow, ConflictingChunksInFlightAreBuiltAgain) {
       for (uint64_t i = 0; i < kChunks; ++i) {
         const auto done = std::make_shared<std::promise<absl::StatusOr<ChunkResult>>>();
         results.push_back(done->get_future());
-        server->registry().hulls().Append(
+        server->registry().changes().Append(
             opened->session,
             {i + 1, {PointOutside(static_cast<int>(2 * i + is_here))}, std::nullopt}, {}, {},
             [done](absl::StatusOr<ChunkResult> result) { done->set_value(std::move(result)); });

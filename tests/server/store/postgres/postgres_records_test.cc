@@ -44,17 +44,17 @@ class PostgresRecords : public PostgresTest {
     body.hull_ids = {"a"};
     body.pieces.assign(pieces, StoredPiece());
     return PostgresRegistry::Wait<PutBodyResult>([&](Reply<PutBodyResult> done) {
-      server.registry().bodies().Put(std::move(body), std::nullopt, std::move(done));
+      server.registry().changes().PutBody(std::move(body), std::nullopt, std::move(done));
     });
   }
   static absl::StatusOr<uint64_t> DeleteBody(PostgresRegistry& server, const std::string& id) {
     return PostgresRegistry::Wait<uint64_t>([&](Reply<uint64_t> done) {
-      server.registry().bodies().Delete(id, std::nullopt, std::move(done));
+      server.registry().changes().Delete("body", id, std::nullopt, std::move(done));
     });
   }
   // DATA_LOSS or NOT_FOUND if the record is unavailable.
   static absl::StatusOr<BodyRecord> FindBody(PostgresRegistry& server, const std::string& id) {
-    const FoundBodies found = server.registry().bodies().Find(std::span(&id, 1));
+    const FoundBodies found = server.registry().records().FindBodies(std::span(&id, 1));
     if (!found.status.ok()) return found.status;
     const std::shared_ptr<const Body>& body = found.bodies.front();
     if (body == nullptr) return absl::NotFoundError("none");
@@ -99,7 +99,7 @@ TEST_F(PostgresRecords, AnUnmatchedPrefixListsNothing) {
   FillSome();
   for (const std::string& prefix : {std::string("a\0", 2), std::string("\xff\xfe"),
                                     std::string("\xc3\xa9"), std::string("a b")}) {
-    const auto page = hulls_->registry().List(prefix, "", 10, {});
+    const auto page = hulls_->registry().records().List(prefix, "", 10, {});
     ASSERT_TRUE(page.ok()) << page.status();
     EXPECT_TRUE(page->entries.empty());
   }
@@ -185,7 +185,7 @@ TEST_F(PostgresRecords, APageOfLargeBodiesIsShortAndHasANextPage) {
   size_t pages = 0;
   for (std::string after;;) {
     const absl::StatusOr<RecordPage> page =
-        hulls_->registry().List("large-", after, 1000, {}, {.bodies = true});
+        hulls_->registry().records().List("large-", after, 1000, {}, {.bodies = true});
     ASSERT_TRUE(page.ok()) << page.status();
     ASSERT_FALSE(page->entries.empty());
     ++pages;
@@ -322,7 +322,7 @@ TEST_F(PostgresRecords, AListIsReadPageByPage) {
   Start();
   std::vector<std::string> listed;
   for (std::string after;;) {
-    const absl::StatusOr<RecordPage> page = hulls_->registry().List("", after, 1);
+    const absl::StatusOr<RecordPage> page = hulls_->registry().records().List("", after, 1);
     ASSERT_TRUE(page.ok()) << page.status();
     ASSERT_EQ(page->entries.size(), 1);
     after = page->entries.front().record.hull_id;
@@ -330,9 +330,9 @@ TEST_F(PostgresRecords, AListIsReadPageByPage) {
     if (!page->more) break;
   }
   EXPECT_EQ(listed, (std::vector<std::string>{"a", "b", "c"}));
-  EXPECT_FALSE(hulls_->registry().List("b", "", 10)->more);
-  EXPECT_EQ(hulls_->registry().List("b", "", 10)->entries.size(), 1);
-  EXPECT_TRUE(hulls_->registry().List("", "c", 10)->entries.empty());
+  EXPECT_FALSE(hulls_->registry().records().List("b", "", 10)->more);
+  EXPECT_EQ(hulls_->registry().records().List("b", "", 10)->entries.size(), 1);
+  EXPECT_TRUE(hulls_->registry().records().List("", "c", 10)->entries.empty());
 }
 
 // One hull is not in memory, one is known to be deleted, one was recreated, and one was recreated
@@ -351,7 +351,7 @@ TEST_F(PostgresRecords, AWatchReportsExistingAndDeletedRecords) {
   ASSERT_TRUE(PutBody(*hulls_, "b").ok());
   // Evicts the cached knowledge of these IDs.
   for (int i = 0; i < 100; ++i) hulls_->View(absl::StrCat("none-", i)).IgnoreError();
-  EXPECT_FALSE(registry.bodies().Find(std::vector<std::string>{"b"}, {}, false).status.ok());
+  EXPECT_FALSE(registry.records().FindBodies(std::vector<std::string>{"b"}, {}, false).status.ok());
   const auto told = [&](uint64_t after, bool bodies = false) {
     std::vector<std::pair<std::string, bool>> events;
     const WatchTarget target{.bodies = bodies};

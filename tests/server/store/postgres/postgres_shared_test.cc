@@ -57,7 +57,7 @@ class PostgresShared : public PostgresTest {
     body.hull_ids = {"piece"};
     body.pieces = {{0, Pose()}};
     return PostgresRegistry::Wait<PutBodyResult>([&](Reply<PutBodyResult> done) {
-      server.registry().bodies().Put(std::move(body), if_revision, std::move(done));
+      server.registry().changes().PutBody(std::move(body), if_revision, std::move(done));
     });
   }
   // Returns the hull as currently stored.
@@ -97,7 +97,7 @@ class PostgresShared : public PostgresTest {
   static std::vector<std::string> Listed(PostgresRegistry& server) {
     EXPECT_TRUE(server.registry().barrier().AwaitPeers({}).ok());
     std::vector<std::string> ids;
-    const absl::StatusOr<RecordPage> page = server.registry().List("", "", 100);
+    const absl::StatusOr<RecordPage> page = server.registry().records().List("", "", 100);
     EXPECT_TRUE(page.ok()) << page.status();
     if (!page.ok()) return ids;
     for (const HullChange& hull : page->entries) {
@@ -257,10 +257,10 @@ TEST_F(PostgresShared, BodiesAndHullsShareTheirIdsAcrossServers) {
   EXPECT_TRUE(absl::IsAborted(PutBody(*hulls_, "b", put->body.revision).status()));
   ASSERT_TRUE(hulls_->registry().barrier().AwaitPeers({}).ok());
   const std::string id = "b";
-  EXPECT_EQ(hulls_->registry().bodies().Find(std::span(&id, 1)).bodies[0]->record().revision,
+  EXPECT_EQ(hulls_->registry().records().FindBodies(std::span(&id, 1)).bodies[0]->record().revision,
             again->body.revision);
   const auto deleted = PostgresRegistry::Wait<uint64_t>([&](Reply<uint64_t> done) {
-    hulls_->registry().bodies().Delete("b", std::nullopt, std::move(done));
+    hulls_->registry().changes().Delete("body", "b", std::nullopt, std::move(done));
   });
   EXPECT_TRUE(deleted.ok()) << deleted.status();
   EXPECT_TRUE(other->Create("b").ok());
@@ -272,7 +272,7 @@ TEST_F(PostgresShared, SessionsEndOnAllServersWhenTheirHullIsDeleted) {
   const Server other = StartPeer();
   std::promise<absl::Status> gone;
   const auto opened = PostgresRegistry::Wait<OpenResult>([&](Reply<OpenResult> done) {
-    hulls_->registry().hulls().OpenAppend(
+    hulls_->registry().changes().OpenAppend(
         "h", "w", true, [&](const absl::Status& status) { gone.set_value(status); },
         std::move(done));
   });
@@ -357,7 +357,7 @@ TEST_F(PostgresShared, WatchesReportIdsThatBecameABodyOrAHull) {
   ASSERT_TRUE(watch_hulls.ok() && watch_both.ok());
   const auto delete_body = [&](const std::string& id) {
     return PostgresRegistry::Wait<uint64_t>([&](Reply<uint64_t> done) {
-      other->registry().bodies().Delete(id, std::nullopt, std::move(done));
+      other->registry().changes().Delete("body", id, std::nullopt, std::move(done));
     });
   };
   ASSERT_TRUE(other->Delete("was-hull").ok());

@@ -1,5 +1,5 @@
-#ifndef HULLD_SERVER_REGISTRY_CHANGES_HULL_CHANGES_H_
-#define HULLD_SERVER_REGISTRY_CHANGES_HULL_CHANGES_H_
+#ifndef HULLD_SERVER_REGISTRY_CHANGES_LOCAL_CHANGES_H_
+#define HULLD_SERVER_REGISTRY_CHANGES_LOCAL_CHANGES_H_
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
@@ -19,14 +19,15 @@
 #include "server/registry/peers/read_barrier.h"
 #include "server/registry/records/record_reader.h"
 #include "server/registry/state/registry_state.h"
+#include "server/store/records.h"
 
 namespace hulld::server {
 
 struct LentBuilder;
 struct PendingChunk;
 
-// Local changes of hulls: creation, deletion, and replacement, and growth by writers' chunks
-// (hull_appender.cc).
+// Local changes of hulls and bodies: creation, deletion, and replacement, and growth of hulls by
+// writers' chunks (hull_appender.cc).
 //
 // Creation, deletion, and replacement depend on the state of an ID: they load that state, wait
 // until no change of the ID is in flight, and then decide within one hold of the mutex. Chunks
@@ -42,32 +43,44 @@ struct PendingChunk;
 //   - Per hull and writer, chunks commit in the order of their sequences, each exactly once; `head`
 //     and the writer's `head` include every chunk in flight, `committed` only committed chunks.
 //     Queued chunks occupy no thread.
+//   - At most one change of a body is in flight (BodyTable::Entry::in_flight). Tasks that depend on
+//     the ID wait in the entry and resume in order after it.
+//   - A hull and a body never share an ID: a creation is refused if the other kind has the ID, and
+//     waits while a creation or an end of the other kind is in flight.
 //   - A change is invisible until the store commits it; a refused change leaves the previous state
 //     unchanged.
 //
 // Guarded by the registry's mutex; functions without a Locked parameter acquire it.
-class HullChanges : public PeerChangeListener {
+class LocalChanges : public PeerChangeListener {
  public:
   // All must outlive this. Chunks are built on `writers`.
-  HullChanges(RegistryState& state, Committer& committer, ReadBarrier& barrier,
-              RecordReader& records, TaskPool& writers)
+  LocalChanges(RegistryState& state, Committer& committer, ReadBarrier& barrier,
+               RecordReader& records, TaskPool& writers)
       : state_(state),
         committer_(committer),
         barrier_(barrier),
         records_(records),
         writers_(writers) {}
-  HullChanges(const HullChanges&) = delete;
-  HullChanges& operator=(const HullChanges&) = delete;
+  LocalChanges(const LocalChanges&) = delete;
+  LocalChanges& operator=(const LocalChanges&) = delete;
 
   // Registers an empty hull. Calls `done`, on this or another thread, after it is committed or
   // refused. Requires: a valid ID (not checked here; CheckHullId runs when the call arrives).
   // ALREADY_EXISTS; RESOURCE_EXHAUSTED: --max-hulls, or the disk is full; UNAVAILABLE: the store
   // cannot be written.
   void Create(const std::string& id, bool if_absent, const Reply<PutHullResult>& done);
-  // Removes a hull and notifies its sessions. Replies with the store's revision, as above.
-  // NOT_FOUND; ABORTED: if_revision does not match; RESOURCE_EXHAUSTED, UNAVAILABLE: as above.
-  void Delete(const std::string& id, std::optional<uint64_t> if_revision,
+  // Removes a hull and notifies its sessions, or removes a body. kind: "hull" or "body". Replies
+  // with the store's revision, as above. NOT_FOUND; ABORTED: if_revision does not match;
+  // RESOURCE_EXHAUSTED, UNAVAILABLE: as above.
+  void Delete(const std::string& kind, const std::string& id, std::optional<uint64_t> if_revision,
               const Reply<uint64_t>& done);
+  // Creates or replaces a body atomically for all readers, and assigns its revisions. Replies as
+  // above. Requires: valid IDs and poses (not checked), and between one and --max-pieces-per-body
+  // pieces. The hulls of the pieces need not exist. ALREADY_EXISTS: a hull has the ID; ABORTED:
+  // if_revision does not match; RESOURCE_EXHAUSTED: --max-hulls, --memory-limit, or the disk is
+  // full; UNAVAILABLE: as above.
+  void PutBody(StoredBody stored, std::optional<uint64_t> if_revision,
+               const Reply<PutBodyResult>& done);
   // Replaces a hull atomically for all readers. The result is a new incarnation: sessions of the
   // former one end. Replies as above. Requires a builder. Copies the vertices, so it must not run
   // on a gRPC thread. NOT_FOUND, unless create_if_absent; ABORTED: if_revision does not match;
@@ -100,28 +113,32 @@ class HullChanges : public PeerChangeListener {
   using Creation = std::function<void(Locked&, absl::StatusOr<HullPointer>)>;
   struct OpenRequest;
   struct BuiltChunk;
-  enum class Verdict;
 
   void Submit(Locked& locked, const HullPointer& hull, Change change, Committer::Completion finish);
   void Advance(Locked& locked, const HullPointer& hull);
 
   void CreateNew(Locked& locked, const std::string& id, const Creation& done);
+  absl::Status CheckPutBody(Locked& locked, const std::string& id,
+                            std::optional<uint64_t> if_revision);
+  void SubmitBody(Locked& locked, Change change, Committer::Completion finish);
   absl::Status CheckReplacement(const RegisteredHull* former, const Replacement& replacement) const;
   void CommitReplacement(Locked& locked, const HullPointer& former,
                          const std::shared_ptr<Replacement>& replacement,
                          const Reply<PutHullResult>& done, const LockedTask& again);
 
-  void RunOpen(const std::shared_ptr<OpenRequest>& request);
-  void OpenLocked(Locked& locked, const std::shared_ptr<OpenRequest>& request);
-  void OpenSession(Locked& locked, const HullPointer& hull,
-                   const std::shared_ptr<OpenRequest>& request, uint64_t last_sequence);
+  void OpenNew(Locked& locked, const std::shared_ptr<OpenRequest>& request,
+               const LockedTask& again);
+  void OpenExisting(Locked& locked, const HullPointer& hull,
+                    const std::shared_ptr<OpenRequest>& request, const LockedTask& again);
+  void OpenSession(Locked& locked, const HullPointer& hull, OpenRequest& request, bool created_hull,
+                   uint64_t last_sequence);
   absl::StatusOr<uint64_t> CommittedSequence(Locked& locked, RegisteredHull& hull,
                                              const std::string& writer_id);
   void RunNextChunk(const HullPointer& hull);
   void RefuseChunks(const HullPointer& hull);
   void ApplyChunk(Locked& locked, const HullPointer& hull, PendingChunk& pending);
-  absl::StatusOr<Verdict> CheckChunk(Locked& locked, RegisteredHull& hull,
-                                     const PendingChunk& pending);
+  absl::StatusOr<bool> CheckChunk(Locked& locked, RegisteredHull& hull,
+                                  const PendingChunk& pending);
   absl::StatusOr<BuiltChunk> Build(Locked& locked, RegisteredHull& hull, PendingChunk& pending);
   absl::StatusOr<std::shared_ptr<LiveHull>> LiveForWriter(Locked& locked, RegisteredHull& hull);
   absl::StatusOr<PointCounts> AddPoints(PendingChunk& pending, LentBuilder& lent, LiveHull& live,
@@ -141,4 +158,4 @@ class HullChanges : public PeerChangeListener {
 
 }  // namespace hulld::server
 
-#endif  // HULLD_SERVER_REGISTRY_CHANGES_HULL_CHANGES_H_
+#endif  // HULLD_SERVER_REGISTRY_CHANGES_LOCAL_CHANGES_H_

@@ -1,12 +1,15 @@
-#include "server/registry/changes/hull_changes.h"
+#include "server/registry/changes/local_changes.h"
 
 #include <absl/strings/str_cat.h>
 
+#include <deque>
 #include <utility>
 #include <vector>
 
 #include "core/base/check.h"
+#include "core/base/status_macros.h"
 #include "server/contract/error_info.h"
+#include "server/registry/catalog/body.h"
 #include "server/registry/catalog/registered_hull.h"
 
 namespace hulld::server {
@@ -41,7 +44,7 @@ void TakeBack(RegisteredHull& hull, Change& change, Replacement& replacement) {
 
 }  // namespace
 
-void HullChanges::Create(const std::string& id, bool if_absent, const Reply<PutHullResult>& done) {
+void LocalChanges::Create(const std::string& id, bool if_absent, const Reply<PutHullResult>& done) {
   records_.WhenReady(
       id, RecordReader::For::kLife, done, [=, this](Locked& locked, const LockedTask& again) {
         const HullPointer existing = state_.Find(id);
@@ -72,7 +75,7 @@ void HullChanges::Create(const std::string& id, bool if_absent, const Reply<PutH
 // ABORTED (Committer::IsSuperseded): a peer server changed the ID first. Requires: the ID is known
 // to have no hull (checked), and no change of a body with the ID is in flight (not checked: its
 // completion would find the hull).
-void HullChanges::CreateNew(Locked& locked, const std::string& id, const Creation& done) {
+void LocalChanges::CreateNew(Locked& locked, const std::string& id, const Creation& done) {
   if (state_.bodies.contains(id)) return done(locked, IdTaken("body", id));
   if (absl::Status s = state_.CheckHullCount(); !s.ok()) return done(locked, s);
   Change change;
@@ -89,33 +92,43 @@ void HullChanges::CreateNew(Locked& locked, const std::string& id, const Creatio
          });
 }
 
-void HullChanges::Delete(const std::string& id, std::optional<uint64_t> if_revision,
-                         const Reply<uint64_t>& done) {
-  records_.WhenReady(
-      id, RecordReader::For::kQuiet, done, [=, this](Locked& locked, const LockedTask& again) {
-        const HullPointer hull = state_.Find(id);
-        if (hull == nullptr) return Answer(locked, done, state_.NoSuchHull(id));
-        const StoredHull& committed = hull->committed();
-        const uint64_t revision = committed.record.revision;
-        if (if_revision.has_value() && *if_revision != revision) {
-          return Answer(locked, done, RevisionMismatch("hull", id, revision, *if_revision));
-        }
-        Change change;
-        change.hull = committed;
-        change.deleted = true;
-        change.former_layout = committed.layout;
-        hull->state.StartEnding();
-        Submit(locked, hull, std::move(change),
-               [=, this](Locked& later, const absl::Status& status, const Change& deletion) {
-                 if (Committer::IsSuperseded(status)) return later.AfterwardsLocked(again);
-                 if (!status.ok()) return Answer(later, done, status);
-                 state_.ApplyDeletion(later, hull, deletion.revision);
-                 Answer(later, done, deletion.revision);
-               });
-      });
+// A hull must be quiet to end; a body always is when it has no change in flight.
+void LocalChanges::Delete(const std::string& kind, const std::string& id,
+                          std::optional<uint64_t> if_revision, const Reply<uint64_t>& done) {
+  const bool is_body = kind == "body";
+  const auto need = is_body ? RecordReader::For::kLife : RecordReader::For::kQuiet;
+  records_.WhenReady(id, need, done, [=, this](Locked& locked, const LockedTask& again) {
+    const HullPointer hull = is_body ? nullptr : state_.Find(id);
+    const std::shared_ptr<const Body> body = is_body ? state_.FindBody(id) : nullptr;
+    if (hull == nullptr && body == nullptr) {
+      return Answer(locked, done, is_body ? state_.NoSuchBody(id) : state_.NoSuchHull(id));
+    }
+    const uint64_t revision = is_body ? body->record().revision : hull->committed().record.revision;
+    if (if_revision.has_value() && *if_revision != revision) {
+      return Answer(locked, done, RevisionMismatch(kind, id, revision, *if_revision));
+    }
+    const auto finish = [=, this](Locked& later, const absl::Status& status,
+                                  const Change& deletion) {
+      if (Committer::IsSuperseded(status)) return later.AfterwardsLocked(again);
+      if (!status.ok()) return Answer(later, done, status);
+      is_body ? state_.ApplyBody(later, id, nullptr, deletion.revision)
+              : state_.ApplyDeletion(later, hull, deletion.revision);
+      Answer(later, done, deletion.revision);
+    };
+    Change change;
+    change.deleted = true;
+    if (is_body) {
+      change.body = body->stored();
+      return SubmitBody(locked, std::move(change), finish);
+    }
+    change.hull = hull->committed();
+    change.former_layout = change.hull.layout;
+    hull->state.StartEnding();
+    Submit(locked, hull, std::move(change), finish);
+  });
 }
 
-void HullChanges::Replace(Replacement replacement, const Reply<PutHullResult>& done) {
+void LocalChanges::Replace(Replacement replacement, const Reply<PutHullResult>& done) {
   HULLD_CHECK(replacement.builder != nullptr);
   std::vector<Vector> vertices = replacement.builder->Vertices();
   if (state_.store.keeps_hulls()) replacement.vertices = vertices;
@@ -132,8 +145,8 @@ void HullChanges::Replace(Replacement replacement, const Reply<PutHullResult>& d
 }
 
 // Returns OK if the replacement is allowed. former: null if no hull exists.
-absl::Status HullChanges::CheckReplacement(const RegisteredHull* former,
-                                           const Replacement& replacement) const {
+absl::Status LocalChanges::CheckReplacement(const RegisteredHull* former,
+                                            const Replacement& replacement) const {
   const std::string& id = replacement.hull_id;
   const uint64_t revision = former == nullptr ? 0 : former->committed().record.revision;
   if (replacement.if_revision.value_or(revision) != revision) {
@@ -147,9 +160,9 @@ absl::Status HullChanges::CheckReplacement(const RegisteredHull* former,
 
 // Submits a replacement, moving its builder and points. former: null if no hull exists; otherwise
 // quiet. again: called if a peer server changed the ID first.
-void HullChanges::CommitReplacement(Locked& locked, const HullPointer& former,
-                                    const std::shared_ptr<Replacement>& replacement,
-                                    const Reply<PutHullResult>& done, const LockedTask& again) {
+void LocalChanges::CommitReplacement(Locked& locked, const HullPointer& former,
+                                     const std::shared_ptr<Replacement>& replacement,
+                                     const Reply<PutHullResult>& done, const LockedTask& again) {
   Change change = MakeChange(former.get(), *replacement);
   const auto hull = std::make_shared<RegisteredHull>(change.hull, HullState::Creating(),
                                                      state_.store.keeps_hulls(), state_.memory);
@@ -179,10 +192,81 @@ void HullChanges::CommitReplacement(Locked& locked, const HullPointer& former,
          });
 }
 
+void LocalChanges::PutBody(StoredBody stored, std::optional<uint64_t> if_revision,
+                           const Reply<PutBodyResult>& done) {
+  HULLD_CHECK(!stored.pieces.empty());
+  const std::string id = stored.record.body_id;
+  const auto body = std::make_shared<Body>(std::move(stored), state_.memory, MemoryUse::kWriting);
+  records_.WhenReady(
+      id, RecordReader::For::kLife, done, [=, this](Locked& locked, const LockedTask& again) {
+        if (absl::Status s = CheckPutBody(locked, id, if_revision); !s.ok()) {
+          return Answer(locked, done, s);
+        }
+        const bool is_new = !state_.bodies.contains(id);
+        const BodyTable::Entry& entry = state_.bodies.Add(id);
+        state_.hulls.ForgetAbsent(id);
+        if (is_new) state_.BeginCreatingBody();
+        Change change;
+        change.body = body->stored();
+        uint64_t& created = change.body->record.create_revision;
+        created = is_new ? 0 : entry.committed()->record().create_revision;
+        // A damaged body starts over.
+        change.begins = created == 0;
+        change.replaces_body = change.begins && !is_new;
+        SubmitBody(locked, std::move(change),
+                   [=, this](Locked& later, const absl::Status& status, const Change& put) {
+                     if (is_new) state_.EndCreatingBody(status.ok());
+                     if (Committer::IsSuperseded(status)) return later.AfterwardsLocked(again);
+                     if (!status.ok()) return Answer(later, done, status);
+                     state_.ApplyBody(later, id, body, put.revision);
+                     Answer(later, done,
+                            PutBodyResult{state_.revision(), body->record(), body->pieces().size(),
+                                          is_new});
+                   });
+      });
+}
+
+// Returns OK if the body may be put, including as a replacement.
+absl::Status LocalChanges::CheckPutBody(Locked& locked, const std::string& id,
+                                        std::optional<uint64_t> if_revision) {
+  // The body is already counted.
+  HULLD_RETURN_IF_ERROR(state_.memory.Check(locked, MemoryUse::kWriting));
+  if (state_.hulls.contains(id)) return IdTaken("hull", id);
+  const std::shared_ptr<const Body> body = state_.FindBody(id);
+  const uint64_t revision = body == nullptr ? 0 : body->record().revision;
+  if (if_revision.has_value() && *if_revision != revision) {
+    return RevisionMismatch("body", id, revision, *if_revision);
+  }
+  return body == nullptr ? state_.CheckHullCount() : absl::OkStatus();
+}
+
+// Submits a change of a body. finish: called after the change is committed and visible, or refused,
+// before waiting tasks resume.
+void LocalChanges::SubmitBody(Locked& locked, Change change, Committer::Completion finish) {
+  const std::string id = change.body->record.body_id;
+  HULLD_CHECK(!std::exchange(state_.bodies.Find(id)->in_flight, true));
+  committer_.Submit(locked, std::move(change),
+                    [this, id, finish = std::move(finish)](
+                        Locked& later, const absl::Status& status, Change& committed) {
+                      finish(later, status, committed);
+                      BodyTable::Entry& entry = *state_.bodies.Find(id);
+                      entry.in_flight = false;
+                      std::deque<LockedTask> waiting = std::exchange(entry.waiting, {});
+                      // Either a creation was refused, or a deletion was committed.
+                      if (entry.committed() == nullptr) state_.EraseBody(later, id);
+                      for (LockedTask& next : waiting) {
+                        // The peer change must be applied first.
+                        Committer::IsSuperseded(status) ? barrier_.Defer(std::move(next))
+                                                        : next(later);
+                      }
+                      state_.bodies.DropSome(later);
+                    });
+}
+
 // Submits a change that follows all earlier changes of its hull. Requires: the state of `hull`
 // counts it as in flight. finish: called after the state's transition, before waiting tasks resume.
-void HullChanges::Submit(Locked& locked, const HullPointer& hull, Change change,
-                         Committer::Completion finish) {
+void LocalChanges::Submit(Locked& locked, const HullPointer& hull, Change change,
+                          Committer::Completion finish) {
   HULLD_CHECK(hull->state.in_flight() > 0);
   const auto charge = std::make_shared<MemoryCharge>(state_.memory, MemoryUse::kWriting,
                                                      change.vertices.capacity() * sizeof(Vector));
@@ -208,7 +292,7 @@ void HullChanges::Submit(Locked& locked, const HullPointer& hull, Change change,
 }
 
 // Resumes the tasks that wait for the hull.
-void HullChanges::Advance(Locked& locked, const HullPointer& hull) {
+void LocalChanges::Advance(Locked& locked, const HullPointer& hull) {
   hull->changed.notify_all();
   while (hull->state.quiet() && !hull->exclusive.empty()) {
     const auto next = std::move(hull->exclusive.front());
@@ -232,8 +316,8 @@ void HullChanges::Advance(Locked& locked, const HullPointer& hull) {
   writers_.Submit([this, hull] { RunNextChunk(hull); }, next.session.client);
 }
 
-void HullChanges::OnPeerChange(Locked& /*locked*/, const std::string& /*id*/,
-                               const HullPointer& hull) {
+void LocalChanges::OnPeerChange(Locked& /*locked*/, const std::string& /*id*/,
+                                const HullPointer& hull) {
   if (hull != nullptr) barrier_.Defer([this, hull](Locked& later) { Advance(later, hull); });
 }
 
