@@ -52,13 +52,14 @@ template <typename SmallPair>
 template <typename Pair>
 class FloatSearch {
  public:
-  FloatSearch(const Pair& pair, double tolerance) : pair_(pair), tolerance_(tolerance) {}
+  FloatSearch(const Pair& pair, double tolerance, SearchEnd end)
+      : pair_(pair), tolerance_(tolerance), end_(end) {}
 
   FloatSearchResult Run(const PlainVector& first) {
     LaneVector n(IsZero(first) ? PlainVector(1, 0, 0) : first);
     while (result_.directions_tried < kMaxDirections && Explore(n)) {
     }
-    result_.axis = along_;
+    if (result_.verdict != FloatVerdict::kSeparated) result_.axis = along_;
     result_.pair_count = simplex_.count();
     for (uint32_t i = 0; i < simplex_.count(); ++i) result_.pairs[i] = simplex_.pair(i);
     return result_;
@@ -81,7 +82,8 @@ class FloatSearch {
     along_ = n.plain();
     if (farthest.value < -error) {
       result_.verdict = FloatVerdict::kSeparated;
-      return false;
+      result_.axis = along_;
+      if (end_ == SearchEnd::kSign) return false;
     }
     // Without progress, no vertex is farther toward the origin.
     const bool is_first = simplex_.count() == 0;
@@ -101,6 +103,14 @@ class FloatSearch {
         outside = simplex_.Add(w, farthest.pair, n);
       }
     }
+    if (result_.verdict == FloatVerdict::kSeparated) {
+      // Separated, only a flat tetrahedron seems to hold the origin.
+      if (!outside) simplex_.ReduceToNearestFace();
+      const double ahead = farthest.value - Dot(along_, last_);
+      last_ = w.plain();
+      return progress && outside && (is_first || ahead > error);
+    }
+    last_ = w.plain();
     if (!outside) {
       if (HoldsOrigin(pair_, simplex_.corner(0), simplex_.corner(1), simplex_.corner(2),
                       simplex_.corner(3))) {
@@ -135,9 +145,12 @@ class FloatSearch {
 
   const Pair& pair_;
   const double tolerance_;
+  const SearchEnd end_;
   Simplex simplex_;
   // The last direction tried.
   PlainVector along_;
+  // The last vertex found.
+  PlainVector last_;
   // With a tolerance: true if A - B is known to reach no farther than the tolerance beyond the
   // origin along some direction.
   bool reach_is_short_ = false;
@@ -147,9 +160,9 @@ class FloatSearch {
 // Pair: a FloatPair or a SmallPair.
 template <typename Pair>
 FloatSearchResult SearchPortably(const FloatPair& pair, double tolerance,
-                                 const PlainVector& first) {
+                                 const PlainVector& first, SearchEnd end) {
   const Pair own(pair);
-  return FloatSearch(own, tolerance).Run(first);
+  return FloatSearch(own, tolerance, end).Run(first);
 }
 
 #ifdef HULLD_HAS_AVX2_PATH
@@ -157,31 +170,34 @@ FloatSearchResult SearchPortably(const FloatPair& pair, double tolerance,
 template <typename Pair>
 __attribute__((target("avx2"), flatten)) FloatSearchResult SearchByAvx2(const FloatPair& pair,
                                                                         double tolerance,
-                                                                        const PlainVector& first) {
+                                                                        const PlainVector& first,
+                                                                        SearchEnd end) {
   const Pair own(pair);
-  return FloatSearch(own, tolerance).Run(first);
+  return FloatSearch(own, tolerance, end).Run(first);
 }
 #else
 template <typename Pair>
-FloatSearchResult SearchByAvx2(const FloatPair& pair, double tolerance, const PlainVector& first) {
-  return SearchPortably<Pair>(pair, tolerance, first);
+FloatSearchResult SearchByAvx2(const FloatPair& pair, double tolerance, const PlainVector& first,
+                               SearchEnd end) {
+  return SearchPortably<Pair>(pair, tolerance, first, end);
 }
 #endif
 
 template <typename Pair>
-FloatSearchResult Search(const FloatPair& pair, double tolerance, const PlainVector& first) {
-  return CurrentSimdPath() == SimdPath::kAvx2 ? SearchByAvx2<Pair>(pair, tolerance, first)
-                                              : SearchPortably<Pair>(pair, tolerance, first);
+FloatSearchResult Search(const FloatPair& pair, double tolerance, const PlainVector& first,
+                         SearchEnd end) {
+  return CurrentSimdPath() == SimdPath::kAvx2 ? SearchByAvx2<Pair>(pair, tolerance, first, end)
+                                              : SearchPortably<Pair>(pair, tolerance, first, end);
 }
 
 }  // namespace
 
 FloatSearchResult SearchInFloatingPoint(const FloatPair& pair, double tolerance,
-                                        const PlainVector& first) {
+                                        const PlainVector& first, SearchEnd end) {
   HULLD_DCHECK(pair.usable());
-  if (SmallPair<8>::Fits(pair)) return Search<SmallPair<8>>(pair, tolerance, first);
-  if (SmallPair<16>::Fits(pair)) return Search<SmallPair<16>>(pair, tolerance, first);
-  return Search<FloatPair>(pair, tolerance, first);
+  if (SmallPair<8>::Fits(pair)) return Search<SmallPair<8>>(pair, tolerance, first, end);
+  if (SmallPair<16>::Fits(pair)) return Search<SmallPair<16>>(pair, tolerance, first, end);
+  return Search<FloatPair>(pair, tolerance, first, end);
 }
 
 FloatSearchResult TryCached(const FloatPair& pair, const PairCache& cache) {
