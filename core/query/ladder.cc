@@ -179,8 +179,7 @@ void Remember(const FloatSearchResult& found, PairCache& cache) {
       return true;
     }
   }
-  const SearchEnd end =
-      purpose == Purpose::kSeparation ? SearchEnd::kNearest : SearchEnd::kSign;
+  const SearchEnd end = purpose == Purpose::kSeparation ? SearchEnd::kNearest : SearchEnd::kSign;
   found = SearchInFloatingPoint(pair, tolerance, first, end);
   decision.directions_tried += found.directions_tried;
   if (cache != nullptr) Remember(found, *cache);

@@ -44,8 +44,8 @@ struct SeparationAnswer {
 // from exact arithmetic, rounded. The values depend on the pair alone, not on the path to the
 // relation. `decision`: of the cores. `relation`: of the rounded hulls; equals the decision's
 // relation if there are no radii. Requires: relations other than kWithinTolerance. `cold`: true if
-// no cache helped the decision and its search ended at SearchEndFor, so that its pairs may be used. CANCELLED: should_stop, which may be
-// empty, returned true. RESOURCE_EXHAUSTED: DepthTooLarge.
+// no cache helped the decision and its search ended at SearchEndFor, so that its pairs may be used.
+// CANCELLED: should_stop, which may be empty, returned true. RESOURCE_EXHAUSTED: DepthTooLarge.
 absl::Status FindSeparation(const FloatPair& pair, const Decision& decision, Relation relation,
                             bool cold, const SeparationRequest& request,
                             const std::function<bool()>& should_stop, SeparationAnswer& answer);

@@ -159,8 +159,8 @@ class FloatSearch {
 
 // Pair: a FloatPair or a SmallPair.
 template <typename Pair>
-FloatSearchResult SearchPortably(const FloatPair& pair, double tolerance,
-                                 const PlainVector& first, SearchEnd end) {
+FloatSearchResult SearchPortably(const FloatPair& pair, double tolerance, const PlainVector& first,
+                                 SearchEnd end) {
   const Pair own(pair);
   return FloatSearch(own, tolerance, end).Run(first);
 }

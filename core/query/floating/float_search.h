@@ -32,14 +32,14 @@ enum class SearchEnd {
 };
 
 // Walks toward the point of A - B that is nearest to the origin (Gilbert, Johnson and Keerthi
-// 1988), until `end`; until the sign of the separation shows if that is not positive. The walk may err; every claim is
-// certified. SEPARATED: the support value is below -SupportError. OVERLAPPING: the origin is inside
-// a tetrahedron of vertices of A - B by more than the error of its volumes. WITHIN_TOLERANCE: a
-// point of A - B and a supporting plane of A - B are both within the tolerance of the origin.
-// `first`: the initial direction, for example from A's center to B's. Requires: pair.usable().
+// 1988), until `end`; until the sign of the separation shows if that is not positive. The walk may
+// err; every claim is certified. SEPARATED: the support value is below -SupportError. OVERLAPPING:
+// the origin is inside a tetrahedron of vertices of A - B by more than the error of its volumes.
+// WITHIN_TOLERANCE: a point of A - B and a supporting plane of A - B are both within the tolerance
+// of the origin. `first`: the initial direction, for example from A's center to B's. Requires:
+// pair.usable().
 FloatSearchResult SearchInFloatingPoint(const FloatPair& pair, double tolerance,
-                                        const PlainVector& first,
-                                        SearchEnd end = SearchEnd::kSign);
+                                        const PlainVector& first, SearchEnd end = SearchEnd::kSign);
 
 // Proves the cached suggestion of an earlier query at the current poses; undecided if that fails.
 // Then, if hulls that touched may touch along the same axis, the result contains that axis and the

@@ -24,11 +24,11 @@ using LaneIds = int64_t __attribute__((vector_size(32)));
 // Sets every lane to the union of the bits of all lanes.
 [[gnu::always_inline]] inline void Unite(Lanes& lanes) {
   const Lanes halves = __builtin_shufflevector(lanes, lanes, 2, 3, 0, 1);
-  lanes = reinterpret_cast<Lanes>(reinterpret_cast<LaneIds>(lanes) |
-                                  reinterpret_cast<LaneIds>(halves));
+  lanes =
+      reinterpret_cast<Lanes>(reinterpret_cast<LaneIds>(lanes) | reinterpret_cast<LaneIds>(halves));
   const Lanes turned = __builtin_shufflevector(lanes, lanes, 1, 0, 3, 2);
-  lanes = reinterpret_cast<Lanes>(reinterpret_cast<LaneIds>(lanes) |
-                                  reinterpret_cast<LaneIds>(turned));
+  lanes =
+      reinterpret_cast<Lanes>(reinterpret_cast<LaneIds>(lanes) | reinterpret_cast<LaneIds>(turned));
 }
 
 // A vector with each coordinate in all four lanes of a register.

@@ -11,6 +11,7 @@
 #include "core/base/check.h"
 #include "core/numeric/exponent_limits.h"
 #include "core/query/floating/lane_vector.h"
+#include "core/query/floating/nearest_part.h"
 #include "core/query/placed/plain_vector.h"
 #include "core/query/terms/vertex_pair.h"
 
@@ -19,9 +20,9 @@ namespace hulld {
 // The corners of the part of A - B that is nearest to the origin so far: a vertex, an edge, or a
 // triangle. The newest comes last.
 //
-// A new corner p makes a simplex with the others. Its nearest part contains p, because p was farther
-// toward the origin, and is one of seven: p, three edges, three faces. All are compared at once, in
-// the lanes of vector registers and without a branch, because the case is unpredictable.
+// A new corner p makes a simplex with the others. Its nearest part contains p, because p was
+// farther toward the origin, and is one of seven: p, three edges, three faces. All are compared at
+// once, in the lanes of vector registers and without a branch, because the case is unpredictable.
 class Simplex {
  public:
   uint32_t count() const { return count_; }
@@ -114,8 +115,7 @@ class Simplex {
         const double turned = np[lane] > 0 ? -1 : 1;
         n = LaneVector(turned * PlainVector(nx[lane], ny[lane], nz[lane]));
       } else {
-        n = LaneVector(ep[lane] * PlainVector(ex[lane], ey[lane], ez[lane]) -
-                       ee[lane] * p.plain());
+        n = LaneVector(ep[lane] * PlainVector(ex[lane], ey[lane], ez[lane]) - ee[lane] * p.plain());
       }
     }
     Keep(static_cast<uint32_t>(std::countr_zero(one)), p, pair);
@@ -123,20 +123,24 @@ class Simplex {
   }
 
   // Reduces a tetrahedron that contains the origin to the nearest of its faces, up to rounding.
-  // Returns the outward normal of that face. Requires: count() is 4.
-  PlainVector ReduceToNearestFace() {
+  // Returns the outward normal of that face. Requires: count() is 4. Not inlined, to keep the
+  // search short.
+  [[gnu::noinline]] PlainVector ReduceToNearestFace() {
     double nearest = INFINITY;
-    int off_face = 3;
+    uint32_t off_face = 3;
     PlainVector outwards(1, 0, 0);
-    for (int i = 0; i < 4; ++i) {
+    for (uint32_t i = 0; i < 4; ++i) {
       const PlainVector p = corner((i + 1) % 4);
-      PlainVector n = Cross(corner((i + 2) % 4) - p, corner((i + 3) % 4) - p);
-      if (Dot(n, corner(i) - p) > 0) n = -n;
-      const double distance = Dot(n, p) / Norm(n);
-      if (!(distance < nearest)) continue;
-      nearest = distance;
+      const PlainVector q = corner((i + 2) % 4);
+      const PlainVector r = corner((i + 3) % 4);
+      // Faces of a flat tetrahedron have the same plane, so the distance of the plane is not
+      // enough.
+      const double squared = SquaredNorm(NearestOnTriangle(p, q, r).point);
+      if (!(squared < nearest)) continue;
+      nearest = squared;
       off_face = i;
-      outwards = n;
+      outwards = Cross(q - p, r - p);
+      if (Dot(outwards, corner(i) - p) > 0) outwards = -outwards;
     }
     // The newest is in lane 3.
     if (off_face < 3) SetLane(off_face, corner(3), pairs_[3]);
@@ -166,8 +170,8 @@ class Simplex {
   }
 
  private:
-  // Parts with p: 0 to 2 are the faces, with the corners of lanes i and i + 1; 3 to 5 are the edges,
-  // with that of lane i - 3; 6 is p alone, 7 the tetrahedron.
+  // Parts with p: 0 to 2 are the faces, with the corners of lanes i and i + 1; 3 to 5 are the
+  // edges, with that of lane i - 3; 6 is p alone, 7 the tetrahedron.
   static constexpr uint32_t kAlone = 6;
   static constexpr uint32_t kWhole = 7;
   static constexpr uint32_t kCount[7] = {3, 3, 3, 2, 2, 2, 1};
