@@ -37,6 +37,7 @@ bool HoldsOrigin(const Pair& pair, const PlainVector& p, const PlainVector& q, c
          -turn * Dot(r_s, q) > bound;
 }
 
+// Finds the vertex w of A - B farthest along n.
 template <typename SmallPair>
 [[gnu::always_inline]] inline void FindFarthest(const SmallPair& pair, const LaneVector& n,
                                                 FloatPair::Support& farthest, LaneVector& w) {
@@ -106,6 +107,7 @@ class FloatSearch {
     if (result_.verdict == FloatVerdict::kSeparated) {
       // Separated, only a flat tetrahedron seems to hold the origin.
       if (!outside) simplex_.ReduceToNearestFace();
+      // The vertex found before is a corner that the direction leads across.
       const double ahead = farthest.value - Dot(along_, last_);
       last_ = w.plain();
       return progress && outside && (is_first || ahead > error);

@@ -32,7 +32,7 @@ enum class SearchEnd {
 };
 
 // Walks toward the point of A - B that is nearest to the origin (Gilbert, Johnson and Keerthi
-// 1988), until `end`; until the sign of the separation shows if that is not positive. The walk may
+// 1988), until the sign of the separation shows, or until `end` if it is positive. The walk may
 // err; every claim is certified. SEPARATED: the support value is below -SupportError. OVERLAPPING:
 // the origin is inside a tetrahedron of vertices of A - B by more than the error of its volumes.
 // WITHIN_TOLERANCE: a point of A - B and a supporting plane of A - B are both within the tolerance

@@ -9,7 +9,6 @@
 #include <limits>
 
 #include "core/base/check.h"
-#include "core/numeric/exponent_limits.h"
 #include "core/query/floating/lane_vector.h"
 #include "core/query/floating/nearest_part.h"
 #include "core/query/placed/plain_vector.h"
@@ -35,7 +34,7 @@ class Simplex {
   [[gnu::always_inline]] bool Contains(VertexPair pair) const {
     const auto number = std::bit_cast<int64_t>(pair);
     return static_cast<int>(pairs_[0] == number) | static_cast<int>(pairs_[1] == number) |
-           static_cast<int>(pairs_[2] == number) | static_cast<int>(pairs_[3] == number);
+           static_cast<int>(pairs_[2] == number);
   }
 
   // Replaces all corners by one.
@@ -74,11 +73,14 @@ class Simplex {
     // The origin is beyond a face if the opposite corner is on the other side.
     const LaneIds beyond = volume > zero ? np > zero : np < zero;
     const LaneIds ahead = ep < zero;
+    // The origin projects into a face; into an edge, seen from both of its faces; or p is nearest.
+    // In exact arithmetic one mask of one lane is set.
     const LaneIds over_face = (ef * ep > ee * fp) & (ef * fp > ff * ep) & (beyond | kFlat[count_]);
     const LaneIds over_edge = ahead & ~(ef * ep > ee * fp) & ~(eg * ep > ee * gp);
     Lanes any_ahead = reinterpret_cast<Lanes>(ahead);
     Unite(any_ahead);
     const LaneIds alone = ~reinterpret_cast<LaneIds>(any_ahead);
+    // Bit i for part i; bit 7 if the origin is outside.
     Lanes bits = reinterpret_cast<Lanes>(
         (over_face & LaneIds{1, 2, 4, 0}) | (over_edge & LaneIds{8, 16, 32, 0}) |
         (alone & LaneIds{64, 64, 64, 64}) | (beyond & LaneIds{128, 128, 128, 0}));
@@ -91,6 +93,7 @@ class Simplex {
       return false;
     }
     const LaneIds sign = {kSign, kSign, kSign, kSign};
+    // The direction is selected by masks, because an index would take longer to arrive.
     const LaneIds turn = ~reinterpret_cast<LaneIds>(np) & sign;
     const auto direction = [&](const Lanes& normal, const Lanes& edge, const Lanes& corner,
                                Lanes& toward) __attribute__((always_inline)) {
@@ -106,7 +109,7 @@ class Simplex {
     uint32_t one = answers & 127;
     if (!std::has_single_bit(one)) [[unlikely]] {
       // Rounding. Takes the first, or p.
-      one = std::max(one & -one, 64u * static_cast<uint32_t>(one == 0));
+      one = one == 0 ? 1u << kAlone : one & -one;
       const auto part = static_cast<uint32_t>(std::countr_zero(one));
       const uint32_t lane = part % 3;
       if (part == kAlone) {
@@ -198,6 +201,7 @@ class Simplex {
   [[gnu::always_inline]] static void Next(const Lanes& lanes, Lanes& next) {
     next = __builtin_shufflevector(lanes, lanes, 1, 2, 0, 3);
   }
+  // Keeps the corners of a part, with p.
   [[gnu::always_inline]] void Keep(uint32_t part, const LaneVector& p, VertexPair pair) {
     const LaneIds kept = kKept[part];
     const LaneIds free = kFree[part];
