@@ -115,15 +115,22 @@ bool NeedsMore(const QueryOptions& options) {
   return options.want_certificate || WantsSeparation(options);
 }
 
-// Adds the requested details of the separation. `decision`: of the cores.
+SeparationRequest RequestOf(const QueryOptions& options) {
+  return {options.want_separation, options.want_witness, options.want_normal,
+          options.max_error,       options.clearance,    options.max_depth_bytes};
+}
+
+Purpose PurposeOf(const QueryOptions& options) {
+  return SearchEndFor(RequestOf(options)) == SearchEnd::kNearest ? Purpose::kSeparation
+                                                                 : Purpose::kEvidence;
+}
+
+// Adds the requested details of the separation. `decision`: of the cores, by PurposeOf.
 absl::Status AddSeparation(const FloatPair& pair, const Decision& decision, bool cold,
                            const QueryOptions& options, Answer& answer) {
   if (!WantsSeparation(options)) return absl::OkStatus();
-  const SeparationRequest request = {options.want_separation, options.want_witness,
-                                     options.want_normal,     options.max_error,
-                                     options.clearance,       options.max_depth_bytes};
   SeparationAnswer found;
-  if (absl::Status s = FindSeparation(pair, decision, answer.relation, cold, request,
+  if (absl::Status s = FindSeparation(pair, decision, answer.relation, cold, RequestOf(options),
                                       options.should_stop, found);
       !s.ok()) {
     return s;
@@ -170,7 +177,7 @@ absl::StatusOr<Answer> CertifiedSearch(const PlacedHull& a, const PlacedHull& b,
   const FloatPair pair(a, b);
   Decision decision;
   if (absl::Status s =
-          Decide(pair, options.tolerance, cache, Purpose::kEvidence, options.should_stop, decision);
+          Decide(pair, options.tolerance, cache, PurposeOf(options), options.should_stop, decision);
       !s.ok()) {
     return s;
   }
@@ -234,7 +241,7 @@ absl::StatusOr<Answer> SearchRounded(const PlacedHull& a, const PlacedHull& b,
   }
   if (!WantsSeparation(options)) return answer;
   Decision of_cores;
-  absl::Status s = Decide(pair, 0, nullptr, Purpose::kEvidence, options.should_stop, of_cores);
+  absl::Status s = Decide(pair, 0, nullptr, PurposeOf(options), options.should_stop, of_cores);
   if (s.ok()) s = AddSeparation(pair, of_cores, /*cold=*/true, options, answer);
   if (!s.ok()) return s;
   return answer;

@@ -179,7 +179,8 @@ void Remember(const FloatSearchResult& found, PairCache& cache) {
       return true;
     }
   }
-  found = SearchInFloatingPoint(pair, tolerance, first);
+  const SearchEnd end = purpose == Purpose::kSeparation ? SearchEnd::kNearest : SearchEnd::kSign;
+  found = SearchInFloatingPoint(pair, tolerance, first, end);
   decision.directions_tried += found.directions_tried;
   if (cache != nullptr) Remember(found, *cache);
   if (found.verdict == FloatVerdict::kUndecided) return false;
@@ -203,7 +204,7 @@ void Remember(const FloatSearchResult& found, PairCache& cache) {
     }
   }
   absl::StatusOr<ExactSearchResult> found =
-      SearchExactly(pair, end, purpose == Purpose::kEvidence, should_stop);
+      SearchExactly(pair, end, purpose != Purpose::kRelation, should_stop);
   if (!found.ok()) return found.status();
   decision.relation = found->relation;
   decision.rung = Rung::kExact;
@@ -222,7 +223,7 @@ absl::Status Decide(const FloatPair& pair, double tolerance, PairCache* cache, P
   if (pair.usable()) {
     const PlainVector n = -pair.CenterDifference();
     if (SpheresSeparate(pair, n)) {
-      if (purpose == Purpose::kEvidence) decision.axis = Vector(n);
+      if (purpose != Purpose::kRelation) decision.axis = Vector(n);
       return absl::OkStatus();
     }
     FloatSearchResult found;

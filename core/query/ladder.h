@@ -36,7 +36,8 @@ struct Decision {
 // The purpose of a decision.
 enum class Purpose {
   kRelation,
-  kEvidence,  // also the axis and the pairs that the search found
+  kEvidence,    // also the axis and the pairs that the search found
+  kSeparation,  // kEvidence, with a search until SearchEnd::kNearest
 };
 
 // Decides the relation by a ladder of rungs, each of which answers only if its own error bound

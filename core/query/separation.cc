@@ -79,20 +79,20 @@ double RadiusOf(const PlacedHull& placed) { return placed.radii()[0] + placed.ra
 class SeparationSearch {
  public:
   SeparationSearch(const FloatPair& pair, const Decision& decision, Relation relation, bool cold,
-                   uint64_t max_depth_bytes, const std::function<bool()>& should_stop)
+                   const SeparationRequest& request, const std::function<bool()>& should_stop)
       : pair_(pair),
         decision_(decision),
         core_(decision.relation),
         relation_(relation),
         radii_(pair.RadiiPlus(0)),
-        max_depth_bytes_(max_depth_bytes),
+        max_depth_bytes_(request.max_depth_bytes),
         should_stop_(should_stop),
         poll_(should_stop, kExpansionsPerPoll),
         size_(pair.a().query_hull().radius() + pair.b().query_hull().radius() + radii_.value()) {
     if (core_ == Relation::kTouching) {
       SetStart(decision.pairs, decision.pair_count);
     } else if (pair.usable()) {
-      StartFrom(decision, cold);
+      StartFrom(decision, cold, SearchEndFor(request));
     }
   }
 
@@ -195,14 +195,14 @@ class SeparationSearch {
   // Chooses the start of the floating-point search: the axis and pairs that the search of the
   // relation ended with, or four pairs with differences that surround the origin. The choice does
   // not depend on the suggestion of a cache.
-  void StartFrom(const Decision& decision, bool cold) {
+  void StartFrom(const Decision& decision, bool cold, SearchEnd end) {
     toward_ = -pair_.CenterDifference();
     if (cold || decision.rung == Rung::kBounds) {
       if (const Vector* n = std::get_if<Vector>(&decision.axis)) toward_ = *n;
       SetStart(decision.pairs, decision.pair_count);
       return;
     }
-    const FloatSearchResult found = SearchInFloatingPoint(pair_, 0, -pair_.CenterDifference());
+    const FloatSearchResult found = SearchInFloatingPoint(pair_, 0, -pair_.CenterDifference(), end);
     if (found.verdict == FloatVerdict::kUndecided) return;
     if (found.verdict == FloatVerdict::kSeparated) toward_ = found.axis;
     SetStart(found.pairs, found.pair_count);
@@ -519,7 +519,7 @@ absl::Status FindSeparation(const FloatPair& pair, const Decision& decision, Rel
                             const std::function<bool()>& should_stop, SeparationAnswer& answer) {
   HULLD_CHECK(decision.relation != Relation::kWithinTolerance &&
               relation != Relation::kWithinTolerance);
-  SeparationSearch search(pair, decision, relation, cold, request.max_depth_bytes, should_stop);
+  SeparationSearch search(pair, decision, relation, cold, request, should_stop);
   if (request.separation || request.witness) {
     if (absl::Status s = search.AddValues(request, answer); !s.ok()) return s;
   }

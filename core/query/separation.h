@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "core/query/floating/float_pair.h"
+#include "core/query/floating/float_search.h"
 #include "core/query/ladder.h"
 #include "core/query/terms/separation.h"
 
@@ -25,6 +26,13 @@ struct SeparationRequest {
   uint64_t max_depth_bytes = std::numeric_limits<uint64_t>::max();
 };
 
+// Returns the end of the search of the relation that suits the request.
+inline SearchEnd SearchEndFor(const SeparationRequest& request) {
+  // A loose goal is often met earlier.
+  const bool is_close = !request.max_error && (request.separation || request.witness);
+  return is_close ? SearchEnd::kNearest : SearchEnd::kSign;
+}
+
 struct SeparationAnswer {
   OptionalSeparation separation;
   std::optional<Witness> witness;
@@ -36,8 +44,8 @@ struct SeparationAnswer {
 // from exact arithmetic, rounded. The values depend on the pair alone, not on the path to the
 // relation. `decision`: of the cores. `relation`: of the rounded hulls; equals the decision's
 // relation if there are no radii. Requires: relations other than kWithinTolerance. `cold`: true if
-// no cache helped the decision, so that its pairs may be used. CANCELLED: should_stop, which may be
-// empty, returned true. RESOURCE_EXHAUSTED: DepthTooLarge.
+// no cache helped the decision and its search ended at SearchEndFor, so that its pairs may be used.
+// CANCELLED: should_stop, which may be empty, returned true. RESOURCE_EXHAUSTED: DepthTooLarge.
 absl::Status FindSeparation(const FloatPair& pair, const Decision& decision, Relation relation,
                             bool cold, const SeparationRequest& request,
                             const std::function<bool()>& should_stop, SeparationAnswer& answer);

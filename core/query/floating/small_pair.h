@@ -8,6 +8,7 @@
 
 #include "core/base/check.h"
 #include "core/query/floating/float_pair.h"
+#include "core/query/floating/lane_vector.h"
 #include "core/query/placed/plain_vector.h"
 #include "core/query/terms/vertex_pair.h"
 
@@ -46,22 +47,24 @@ class SmallPair {
   // Returns the farthest vertex: its value is within FloatPair::SupportError of the maximum
   // (kSupportErrorFactor).
   [[gnu::always_inline]] FloatPair::Support Farthest(const PlainVector& n) const {
-    const Lanes x = {n.x, n.x, n.x, n.x};
-    const Lanes y = {n.y, n.y, n.y, n.y};
-    const Lanes z = {n.z, n.z, n.z, n.z};
-    Lanes best_a, best_b;
-    a_.Best(x, y, z, best_a);
-    against_b_.Best(x, y, z, best_b);
-    // Reduces both hulls at once: A in the lower half, B in the upper.
-    Lanes best = __builtin_shufflevector(best_a, best_b, 0, 1, 4, 5);
-    const Lanes rest = __builtin_shufflevector(best_a, best_b, 2, 3, 6, 7);
-    best = best > rest ? best : rest;
-    const Lanes turned = __builtin_shufflevector(best, best, 1, 0, 3, 2);
-    best = best > turned ? best : turned;
-    const LaneIds ids = reinterpret_cast<LaneIds>(best);
-    const VertexPair place = {PlaceOf(ids[0]), PlaceOf(ids[2])};
-    const VertexPair found = {std::min(place.a, a_.last), std::min(place.b, against_b_.last)};
-    return {found, Dot(n, Difference(place))};
+    const VertexPair place = PlaceAlong(LaneVector(n));
+    return {VertexAt(place), Dot(n, Difference(place))};
+  }
+  // Farthest; sets w to the vertex.
+  [[gnu::always_inline]] FloatPair::Support Farthest(const LaneVector& n, LaneVector& w) const {
+    const VertexPair place = PlaceAlong(n);
+    const auto difference = [&](const double* a, const double* b, Lanes& lanes)
+        __attribute__((always_inline)) {
+      Lanes against;
+      Broadcast(a[place.a], lanes);
+      Broadcast(b[place.b], against);
+      lanes += against;
+    };
+    difference(a_.x, against_b_.x, w.x);
+    difference(a_.y, against_b_.y, w.y);
+    difference(a_.z, against_b_.z, w.z);
+    const Lanes value = (n.x * w.x + n.y * w.y) + n.z * w.z;
+    return {VertexAt(place), value[0]};
   }
 
   [[gnu::always_inline]] PlainVector Difference(VertexPair pair) const {
@@ -70,13 +73,27 @@ class SmallPair {
   }
 
  private:
-  // Four doubles, and four integers of the same width, in the registers of the compilation target.
-  using Lanes = double __attribute__((vector_size(32)));
-  using LaneIds = int64_t __attribute__((vector_size(32)));
   // The low bits of a value, which contain its vertex number.
   static constexpr int64_t kIdMask = kMaxVertices - 1;
 
   static uint32_t PlaceOf(int64_t numbered) { return static_cast<uint32_t>(numbered & kIdMask); }
+
+  [[gnu::always_inline]] VertexPair PlaceAlong(const LaneVector& n) const {
+    Lanes best_a, best_b;
+    a_.Best(n.x, n.y, n.z, best_a);
+    against_b_.Best(n.x, n.y, n.z, best_b);
+    // Reduces both hulls at once: A in the lower half, B in the upper.
+    Lanes best = __builtin_shufflevector(best_a, best_b, 0, 1, 4, 5);
+    const Lanes rest = __builtin_shufflevector(best_a, best_b, 2, 3, 6, 7);
+    best = best > rest ? best : rest;
+    const Lanes turned = __builtin_shufflevector(best, best, 1, 0, 3, 2);
+    best = best > turned ? best : turned;
+    const LaneIds ids = reinterpret_cast<LaneIds>(best);
+    return {PlaceOf(ids[0]), PlaceOf(ids[2])};
+  }
+  VertexPair VertexAt(VertexPair place) const {
+    return {std::min(place.a, a_.last), std::min(place.b, against_b_.last)};
+  }
 
   struct Side {
     // Stores the vertices in the pair's frame, times `sign`; repeats the last one to fill up.
