@@ -91,7 +91,8 @@ absl::StatusOr<PointFormat> PointFormatOfPath(const std::string& path) {
 
 bool IsMeshFormat(PointFormat format) {
   return format == PointFormat::kObj || format == PointFormat::kOff ||
-         format == PointFormat::kStl || format == PointFormat::kGltf || format == PointFormat::kDae;
+         format == PointFormat::kPly || format == PointFormat::kStl ||
+         format == PointFormat::kGltf || format == PointFormat::kDae;
 }
 
 absl::StatusOr<ReadCounts> ReadPoints(const ReadRequest& request, const BlockReceiver& receive) {
