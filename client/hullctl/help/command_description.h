@@ -16,7 +16,8 @@ struct OptionDescription {
   // "-o" and "--out"; a single name without a dash, such as "FILE", is an argument.
   std::vector<std::string> names;
   std::string help;
-  // Name of the value; empty for a flag.
+  // Name of the value; empty for a flag. For an argument: its text in the usage, if that is not its
+  // name.
   std::string value_name;
   // Environment variable that also sets the value, if any.
   std::string variable;
