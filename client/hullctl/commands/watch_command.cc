@@ -154,8 +154,9 @@ ExitCode WatchScene(const Invocation& run, const WatchOptions& options) {
   bool is_synced = false;
   const auto print = [&](const v1::WatchCollisionsResponse& message) {
     for (const v1::PlacementProblem& problem : message.placement_problems()) {
-      run.err << "hullctl: placement " << name(problem.placement()) << ": " << problem.message()
-              << "\n";
+      const std::string* const id = scene->HullOf(problem.placement());
+      run.err << "hullctl: placement " << name(problem.placement()) << ": "
+              << (id == nullptr ? problem.message() : scene->ProblemText(*id, problem)) << "\n";
     }
     for (const v1::CollisionEvent& event : message.events()) {
       if (run.json()) break;
