@@ -332,11 +332,15 @@ std::string Scene::InKeys(const std::string& message) const {
   if (names.empty()) return message;
   std::string text = absl::StrReplaceAll(message, {{"wanted.", "ask."},
                                                    {"an end_pose", "a \"to\""},
+                                                   {"].end_pose is set", "] has a \"to\""},
                                                    {"end_pose", "\"to\""},
                                                    {"METHOD_TEXTBOOK_SAT", "--textbook"},
                                                    {"first_only", "--first"},
                                                    {"every_piece", "--every-piece"},
-                                                   {"and limit ", "and --nearest "}});
+                                                   {"and limit ", "and --nearest "},
+                                                   {"use CheckCollision, BatchCheckCollisions, or "
+                                                    "FindCollisions",
+                                                    "use 'hullctl batch' or 'hullctl scene'"}});
   constexpr std::string_view kPlacements = "placements[";
   for (size_t at = 0; (at = text.find(kPlacements, at)) != std::string::npos; ++at) {
     const size_t begin = at + kPlacements.size();

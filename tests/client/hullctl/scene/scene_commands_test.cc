@@ -151,12 +151,15 @@ TEST_F(HullctlScene, ConflictsNameTheKeysOfTheFile) {
       "place: {a: {id: cube}, b: {id: cube, at: [3, 0, 0], to: [2, 0, 0]}}\nask: {";
   const TempFile all("all.yaml", place + "separation: true}\n");
   const TempFile pairs("pairs.yaml", place + "separation: true, pairs: [[a, b]]}\n");
-  const std::string text = "ask.separation cannot be combined with \"to\"; query the first contact";
-  for (const std::vector<std::string>& command :
-       {std::vector<std::string>{"scene", "check", all.path()},
-        {"scene", "check", pairs.path()},
-        {"batch", all.path()},
-        {"stream", all.path()}}) {
+  const std::string conflict = "ask.separation cannot be combined with \"to\"; query the first";
+  const std::string motion = "does not support motions; use 'hullctl batch' or 'hullctl scene'\n";
+  const std::pair<std::vector<std::string>, std::string> cases[] = {
+      {{"scene", "check", all.path()}, conflict},
+      {{"scene", "check", pairs.path()}, conflict},
+      {{"batch", all.path()}, conflict},
+      {{"stream", all.path()}, "placement b has a \"to\", but a stream " + motion},
+      {{"watch", "--scene", all.path()}, "placement b has a \"to\", but a watch " + motion}};
+  for (const auto& [command, text] : cases) {
     const Ran ran = Ask(command);
     EXPECT_NE(ran.code, 0);
     EXPECT_THAT(ran.out + ran.err, HasSubstr(text)) << command[0];
