@@ -341,15 +341,14 @@ std::string Scene::InKeys(const std::string& message) const {
                                                    {"use CheckCollision, BatchCheckCollisions, or "
                                                     "FindCollisions",
                                                     "use 'hullctl batch' or 'hullctl scene'"}});
+  // Updates of a stream have placements of their own.
+  const size_t at = text.starts_with("open: ") ? 6 : 0;
   constexpr std::string_view kPlacements = "placements[";
-  for (size_t at = 0; (at = text.find(kPlacements, at)) != std::string::npos; ++at) {
-    const size_t begin = at + kPlacements.size();
-    const size_t end = text.find(']', begin);
-    uint32_t index = 0;
-    if (end == std::string::npos || !absl::SimpleAtoi(text.substr(begin, end - begin), &index) ||
-        index >= names.size()) {
-      continue;
-    }
+  const size_t begin = at + kPlacements.size();
+  const size_t end = text.find(']');
+  uint32_t index = 0;
+  if (text.compare(at, kPlacements.size(), kPlacements) == 0 && end != std::string::npos &&
+      absl::SimpleAtoi(text.substr(begin, end - begin), &index) && index < names.size()) {
     text.replace(at, end + 1 - at, "placement " + names[index]);
   }
   return text;
