@@ -8,8 +8,8 @@
 
 namespace hulld {
 
-// Kind of a value, for completion. kPlaced: a hull or a body.
-enum class ValueKind { kText, kFile, kDirectory, kHull, kBody, kPlaced, kContext };
+// Kind of a value, for completion. kPlaced: a hull or a body. kShape: a hull, a body, or a file.
+enum class ValueKind { kText, kFile, kDirectory, kHull, kBody, kPlaced, kShape, kContext };
 
 // An option, a flag, or a positional argument.
 struct OptionDescription {

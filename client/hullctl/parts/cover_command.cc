@@ -181,7 +181,7 @@ void AddCoverCommand(Command program, Invocation* invocation) {
                 "IDs of hulls or bodies, then the mesh (obj, off, ply, stl, gltf, dae)")
       .ValueName("ID... FILE")
       .Required()
-      .Completes(ValueKind::kPlaced);
+      .Completes(ValueKind::kShape);
   command.AddNumber(
       "--limit", 0, kAnyNumber,
       absl::StrCat("Triangles to list, the farthest first (default ", kDefaultLimit, ")"),
