@@ -85,8 +85,8 @@ absl::StatusOr<PointFormat> PointFormatOfPath(const std::string& path) {
     if (auto format = PointFormatFromName(file.substr(dot + 1)); format.ok()) return format;
   }
   return absl::InvalidArgumentError(
-      absl::StrCat(path, ": unknown file extension; set the format with --format (",
-                   absl::StrJoin(PointFormatNames(), ", "), ")"));
+      absl::StrCat(path, ": unknown file extension; convert or rename the file; supported are ",
+                   absl::StrJoin(PointFormatNames(), ", ")));
 }
 
 bool IsMeshFormat(PointFormat format) {

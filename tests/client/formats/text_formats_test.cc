@@ -435,7 +435,8 @@ TEST(Formats, AreRecognizedByExtensionInAnyCase) {
   EXPECT_EQ(*PointFormatOfPath("/a.b/C.OBJ"), PointFormat::kObj);
   EXPECT_EQ(*PointFormatOfPath("x.glb"), PointFormat::kGltf);
   EXPECT_THAT(std::string(PointFormatOfPath("/a.obj/file").status().message()),
-              HasSubstr("--format"));
+              HasSubstr("/a.obj/file: unknown file extension; convert or rename the file; "
+                        "supported are obj, off, "));
   EXPECT_FALSE(PointFormatOfPath("x.docx").ok());
 }
 
