@@ -156,6 +156,20 @@ constexpr Reading kCounters[] = {
      Get<&Measured::disk, &StoreDisk::stalls>},
 };
 
+// Binds the addresses and releases them, so that a wrong one fails before RocksDB creates its
+// directory. Over PostgreSQL, a standby may wait for the address of the active server.
+absl::Status CheckAddresses(const Config& config) {
+  HULLD_RETURN_IF_ERROR(CheckListening(config));
+  if (config.store != "rocksdb") return absl::OkStatus();
+  HULLD_ASSIGN_OR_RETURN(const ListenAddress address, ParseListenAddress(config.listen));
+  HULLD_RETURN_IF_ERROR(CheckSocketFree(address));
+  ConnectionTable table(1, 1);
+  Metrics metrics;
+  HULLD_ASSIGN_OR_RETURN(const auto acceptor, ConnectionAcceptor::Listen(address, table, metrics));
+  if (config.metrics_address.empty()) return absl::OkStatus();
+  return MetricsEndpoint::Start(config.metrics_address, config.metrics_insecure, metrics).status();
+}
+
 }  // namespace
 
 Server::Server(const Config& config, std::unique_ptr<Guard> guard, std::unique_ptr<Store> store)
@@ -209,6 +223,7 @@ void Server::AddSizesToMetrics() {
 
 absl::StatusOr<std::unique_ptr<Server>> Server::Start(const Config& config,
                                                       std::function<bool()> should_stop) {
+  HULLD_RETURN_IF_ERROR(CheckAddresses(config));
   HULLD_ASSIGN_OR_RETURN(std::unique_ptr<Guard> guard, Guard::Load(config));
   HULLD_ASSIGN_OR_RETURN(std::unique_ptr<Store> store, OpenStore(config, should_stop));
   std::unique_ptr<Server> server(new Server(config, std::move(guard), std::move(store)));
@@ -218,7 +233,6 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(const Config& config,
 }
 
 absl::Status Server::Listen(const Config& config) {
-  HULLD_RETURN_IF_ERROR(CheckListening(config));
   const absl::StatusOr<ListenAddress> address = ParseListenAddress(config.listen);
   HULLD_RETURN_IF_ERROR(CheckSocketFree(*address));
 

@@ -4,19 +4,18 @@
 #include <algorithm>
 #include <array>
 #include <optional>
+#include <string>
 #include <vector>
 
+#include "client/formats/csv_reader.h"
 #include "client/formats/point_file.h"
 #include "client/formats/text_number.h"
 
 namespace hulld {
 namespace {
 
-// Columns of x, y, and z.
-using Columns = std::array<size_t, 3>;
-
 // Returns the separator: a semicolon or tab if the first row contains one. A comma may then be a
-// decimal mark, which fails later. ' ': white space of any length.
+// decimal mark, which fails later.
 char SeparatorOf(std::string_view first_row) {
   for (const char separator : {';', '\t', ',', ' '}) {
     if (first_row.find(separator) != std::string_view::npos) return separator;
@@ -32,7 +31,9 @@ void SplitRow(std::string_view row, char separator, std::vector<std::string_view
   bool quoted = false;
   for (size_t i = 0; i <= row.size(); ++i) {
     if (i < row.size() && row[i] == '"') quoted = !quoted;
-    if (i < row.size() && (row[i] != separator || quoted)) continue;
+    const bool is_separator =
+        i == row.size() || row[i] == separator || (separator == ' ' && row[i] == '\t');
+    if (!is_separator || (quoted && i < row.size())) continue;
     std::string_view cell = Trim(row.substr(begin, i - begin));
     begin = i + 1;
     if (separator == ' ' && cell.empty()) continue;
@@ -55,28 +56,45 @@ bool IsHeader(const std::vector<std::string_view>& cells) {
   return true;
 }
 
-absl::Status FindColumns(const ByteSource& source, const std::vector<std::string_view>& header,
-                         Columns* columns) {
-  Columns places = {};
+// Returns the axis that a column is named after.
+std::optional<size_t> AxisOf(std::string_view cell) {
+  std::string name = absl::AsciiStrToLower(std::string(cell));
+  const bool is_paraview = name.starts_with("points:") || name.starts_with("points_");
+  if (is_paraview) name.erase(0, 7);
+  const size_t axis = std::string_view(is_paraview ? "012" : "xyz").find(name);
+  if (name.size() == 1 && axis != std::string_view::npos) return axis;
+  return std::nullopt;
+}
+
+absl::Status FindColumns(const ByteSource& source, std::string_view line,
+                         const std::vector<std::string_view>& header,
+                         std::array<size_t, 3>* columns) {
+  std::array<std::optional<size_t>, 3> found;
+  for (size_t i = 0; i < header.size(); ++i) {
+    const std::optional<size_t> axis = AxisOf(header[i]);
+    if (!axis) continue;
+    if (found[*axis]) {
+      return source.ErrorAtLine(absl::StrCat(
+          "the header ", Quoted(line), " names ", std::string(1, "xyz"[*axis]), " in columns ",
+          *found[*axis] + 1, " and ", i + 1, "; it must name x, y and z once"));
+    }
+    found[*axis] = i;
+  }
   for (size_t axis = 0; axis < 3; ++axis) {
-    const auto found = std::find_if(header.begin(), header.end(), [axis](std::string_view cell) {
-      return cell.size() == 1 &&
-             absl::ascii_tolower(static_cast<unsigned char>(cell[0])) == "xyz"[axis];
-    });
-    if (found == header.end()) {
-      return source.ErrorAtLine(absl::StrCat("the header has no column \"",
+    if (!found[axis]) {
+      return source.ErrorAtLine(absl::StrCat("the header ", Quoted(line), " has no column \"",
                                              std::string(1, "xyz"[axis]),
                                              "\"; it must name x, y and z"));
     }
-    places[axis] = static_cast<size_t>(found - header.begin());
+    (*columns)[axis] = *found[axis];
   }
-  *columns = places;
   return absl::OkStatus();
 }
 
-// named: the number of columns that the header names, 0 without a header.
 absl::Status AddRow(const ByteSource& source, const std::vector<std::string_view>& cells,
-                    size_t named, const Columns& columns, PointCollector* points) {
+                    const CsvLayout& layout, PointCollector* points) {
+  const auto& columns = layout.columns;
+  const size_t named = layout.named;
   // R's write.table names the columns of the data, but not that of the row names.
   if (named > 0 && cells.size() > named && !cells[named].empty()) {
     return source.ErrorAtLine(absl::StrCat("the row has ", Counted(cells.size(), "column"),
@@ -99,41 +117,73 @@ absl::Status AddRow(const ByteSource& source, const std::vector<std::string_view
 
 }  // namespace
 
-absl::Status ReadCsv(ByteSource* source, PointCollector* points) {
-  std::string_view line;
+bool IsCsvComment(std::string_view line) {
+  return line.substr(0, 1) == "#" || line.substr(0, 2) == "//";
+}
+
+absl::StatusOr<std::optional<CsvLayout>> CsvHeader(const ByteSource& source, std::string_view line,
+                                                   std::optional<char> separator) {
+  line = Trim(line);
+  CsvLayout layout;
+  layout.separator = separator.value_or(SeparatorOf(line));
   std::vector<std::string_view> cells;
-  Columns columns = {0, 1, 2};
-  // Number of columns that the header names; 0 without a header.
-  size_t named = 0;
+  SplitRow(line, layout.separator, &cells);
+  const absl::Status status = FindColumns(source, line, cells, &layout.columns);
+  layout.named = cells.size();
+  if (status.ok()) return layout;
+  if (IsHeader(cells)) return status;
+  return std::nullopt;
+}
+
+std::optional<CsvLayout> CsvHeaderInComment(const ByteSource& source, std::string_view line,
+                                            std::optional<char> separator) {
+  line.remove_prefix(std::min(line.find_first_not_of("/#"), line.size()));
+  return CsvHeader(source, line, separator).value_or(std::nullopt);
+}
+
+bool IsRowOf(const CsvLayout& layout, std::string_view row) {
+  std::vector<std::string_view> cells;
+  SplitRow(row, layout.separator, &cells);
+  while (cells.size() > layout.named && cells.back().empty()) cells.pop_back();
+  return cells.size() == layout.named;
+}
+
+absl::Status ReadCsvRows(ByteSource* source, const CsvLayout& layout, std::string_view row,
+                         PointCollector* points) {
+  std::vector<std::string_view> cells;
+  do {
+    const std::string_view content = Trim(row);
+    if (content.empty() || IsCsvComment(content)) continue;
+    // Split untrimmed, because trimming would remove the tab next to an empty first or last cell.
+    SplitRow(row, layout.separator, &cells);
+    if (absl::Status status = AddRow(*source, cells, layout, points); !status.ok()) return status;
+  } while (source->ReadLine(&row));
+  return source->status();
+}
+
+absl::Status ReadCsv(ByteSource* source, PointCollector* points) {
+  std::optional<CsvLayout> commented;
   std::optional<char> declared;
-  char separator = ',';
-  for (bool first = true; source->ReadLine(&line);) {
+  for (std::string_view line; source->ReadLine(&line);) {
     const std::string_view content = Trim(line);
-    const bool is_comment = content.substr(0, 1) == "#" || content.substr(0, 2) == "//";
-    if (content.empty() || (is_comment && !first)) continue;
-    if (first && content.size() == 5 && content.substr(0, 4) == "sep=") {
+    if (content.empty()) continue;
+    if (content.size() == 5 && content.substr(0, 4) == "sep=") {
       declared = content[4];
       continue;
     }
-    // CloudCompare and numpy start a header with a comment mark. Other rows are split untrimmed,
-    // because trimming would remove the tab next to an empty first or last cell.
-    if (is_comment) {
-      line = Trim(content.substr(std::min(content.find_first_not_of("/#"), content.size())));
+    if (IsCsvComment(content)) {
+      if (!commented) commented = CsvHeaderInComment(*source, content, declared);
+      continue;
     }
-    if (first) separator = declared.value_or(SeparatorOf(Trim(line)));
-    SplitRow(line, separator, &cells);
-    absl::Status status;
-    bool is_header = false;
-    if (first) {
-      status = FindColumns(*source, cells, &columns);
-      // A first line such as "# exported by ..." is a comment.
-      if (!status.ok() && content.front() == '#') continue;
-      is_header = status.ok() || IsHeader(cells);
-      named = is_header ? cells.size() : 0;
-      first = false;
+    if (commented && IsRowOf(*commented, line)) {
+      return ReadCsvRows(source, *commented, line, points);
     }
-    if (!is_header) status = AddRow(*source, cells, named, columns, points);
-    if (!status.ok()) return status;
+    const auto header = CsvHeader(*source, content, declared);
+    if (!header.ok()) return header.status();
+    if (header->has_value()) return ReadCsvRows(source, **header, "", points);
+    CsvLayout layout;
+    layout.separator = declared.value_or(SeparatorOf(content));
+    return ReadCsvRows(source, layout, line, points);
   }
   return source->status();
 }

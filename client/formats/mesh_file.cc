@@ -34,13 +34,6 @@ absl::Status AddVertex(const ByteSource& source, std::string_view text, Triangle
   return absl::OkStatus();
 }
 
-// Adds the polygon as a fan from its first corner.
-void AddPolygon(const std::vector<uint32_t>& corners, TriangleMesh* mesh) {
-  for (size_t i = 2; i < corners.size(); ++i) {
-    mesh->triangles.push_back({corners[0], corners[i - 1], corners[i]});
-  }
-}
-
 // Returns the triangles of a mesh in parts. part_of: the part of each triangle.
 std::vector<MeshPart> Distribute(const TriangleMesh& mesh, const std::vector<uint32_t>& part_of,
                                  const std::vector<std::string>& names) {
@@ -105,6 +98,12 @@ std::vector<MeshPart> Components(const TriangleMesh& mesh) {
 }
 
 }  // namespace
+
+void AddPolygon(const std::vector<uint32_t>& corners, TriangleMesh* mesh) {
+  for (size_t i = 2; i < corners.size(); ++i) {
+    mesh->triangles.push_back({corners[0], corners[i - 1], corners[i]});
+  }
+}
 
 absl::Status AddMesh(const std::string& file, const TriangleMesh& part, TriangleMesh* to) {
   const size_t first = to->vertices.size();
@@ -208,7 +207,9 @@ absl::StatusOr<std::vector<MeshPart>> ReadParts(const std::string& path, SplitBy
   const absl::StatusOr<PointFormat> format = PointFormatOfPath(path);
   if (!format.ok()) return format.status();
   std::vector<MeshPart> parts;
-  if (split == SplitBy::kComponent || !IsMeshFormat(*format) || *format == PointFormat::kOff) {
+  const bool has_names =
+      IsMeshFormat(*format) && *format != PointFormat::kOff && *format != PointFormat::kPly;
+  if (split == SplitBy::kComponent || !has_names) {
     const auto mesh = ReadMesh(path);
     if (!mesh.ok()) return mesh.status();
     if (split == SplitBy::kComponent) {
@@ -256,6 +257,9 @@ absl::StatusOr<TriangleMesh> ReadMesh(const std::string& path) {
     case PointFormat::kOff:
       status = ReadOffMesh(source->get(), &mesh);
       break;
+    case PointFormat::kPly:
+      status = ReadPlyMesh(source->get(), &mesh);
+      break;
     case PointFormat::kStl:
     case PointFormat::kGltf:
     case PointFormat::kDae: {
@@ -268,7 +272,7 @@ absl::StatusOr<TriangleMesh> ReadMesh(const std::string& path) {
     }
     default:
       status = absl::InvalidArgumentError(absl::StrCat(
-          path, ": meshes are read from obj, off, stl, gltf and dae; convert the file"));
+          path, ": meshes are read from obj, off, ply, stl, gltf and dae; convert the file"));
   }
   if (!status.ok()) return status;
   return mesh;

@@ -19,8 +19,8 @@ struct TriangleMesh {
   std::vector<std::array<uint32_t, 3>> triangles;
 };
 
-// Reads obj, off, stl, gltf, glb or dae, by the extension; polygons become fans. INVALID_ARGUMENT
-// names the file and the location.
+// Reads obj, off, ply, stl, gltf, glb or dae, by the extension; polygons become fans. The mesh of a
+// PLY file without faces is empty. INVALID_ARGUMENT names the file and the location.
 absl::StatusOr<TriangleMesh> ReadMesh(const std::string& path);
 
 // A part of a file. The name comes from the file, or is empty.
@@ -31,7 +31,7 @@ struct MeshPart {
 
 enum class SplitBy {
   // By name: objects and groups of obj, solids of stl, nodes of gltf and dae. Parts with the same
-  // name form one part; off has no names and forms one part.
+  // name form one part; off and ply have no names and form one part.
   kName,
   // By connected component: triangles that share a vertex (by coordinates) belong together. Named
   // "component-1" and so on, in the order of the file.
@@ -46,10 +46,14 @@ absl::StatusOr<std::vector<MeshPart>> ReadParts(const std::string& path, SplitBy
 // The readers of glTF and COLLADA apply the transform of each node to its meshes.
 absl::Status ReadObjMesh(ByteSource* source, TriangleMesh* mesh);
 absl::Status ReadOffMesh(ByteSource* source, TriangleMesh* mesh);
+absl::Status ReadPlyMesh(ByteSource* source, TriangleMesh* mesh);
 absl::Status ReadObjParts(ByteSource* source, std::vector<MeshPart>* parts);
 absl::Status ReadStlParts(ByteSource* source, std::vector<MeshPart>* parts);
 absl::Status ReadGltfParts(ByteSource* source, std::vector<MeshPart>* parts);
 absl::Status ReadDaeParts(ByteSource* source, std::vector<MeshPart>* parts);
+
+// Adds the polygon as a fan from its first corner.
+void AddPolygon(const std::vector<uint32_t>& corners, TriangleMesh* mesh);
 
 // Adds `part` to `to`. INVALID_ARGUMENT, naming `file`, if there are too many vertices.
 absl::Status AddMesh(const std::string& file, const TriangleMesh& part, TriangleMesh* to);

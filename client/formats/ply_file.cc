@@ -1,14 +1,19 @@
 // PLY: a text header declares elements and their properties in order. Their values follow as text,
-// in lines of any length, or as packed scalars. Elements other than `vertex` are read to check that
+// in lines of any length, or as packed scalars. Elements that are not needed are read to check that
 // the file is complete.
 #include <absl/strings/str_cat.h>
 
+#include <algorithm>
 #include <array>
+#include <charconv>
+#include <cmath>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "client/formats/binary_scalar.h"
+#include "client/formats/mesh_file.h"
 #include "client/formats/point_file.h"
 #include "client/formats/text_number.h"
 
@@ -16,6 +21,11 @@ namespace hulld {
 namespace {
 
 constexpr size_t kMaxHeaderLines = 10000;
+constexpr std::string_view kFaces = "face";
+constexpr std::string_view kStrips = "tristrips";
+
+// Indices of vertices, not checked.
+using Corners = std::vector<int64_t>;
 
 struct Property {
   // For a list, the type of its items.
@@ -24,6 +34,8 @@ struct Property {
   std::optional<ScalarType> count_type;
   // 0, 1, 2 for x, y, z.
   std::optional<size_t> axis;
+  // True for the list of the vertices of a face or strip.
+  bool is_corners = false;
 };
 
 struct Element {
@@ -113,6 +125,9 @@ absl::Status ParseProperty(const ByteSource& source, std::string_view rest, PlyH
   if (name.size() == 1 && axis != std::string_view::npos && !property.count_type) {
     property.axis = axis;
   }
+  property.is_corners = property.count_type && type != ScalarType::kFloat &&
+                        type != ScalarType::kDouble &&
+                        (name == "vertex_indices" || name == "vertex_index");
   element.properties.push_back(property);
   return absl::OkStatus();
 }
@@ -144,6 +159,14 @@ absl::Status ParsePlyHeader(ByteSource* source, PlyHeader* header) {
   return source->Truncated("before end_header");
 }
 
+// Returns true if the element names the vertices of faces, or of triangle strips as in files of
+// Stanford University.
+bool HoldsFaces(const Element& element) {
+  return (element.name == kFaces || element.name == kStrips) &&
+         std::any_of(element.properties.begin(), element.properties.end(),
+                     [](const Property& property) { return property.is_corners; });
+}
+
 bool HoldsFloats(const Element& vertex) {
   for (const Property& property : vertex.properties) {
     if (property.axis && property.type != ScalarType::kFloat) return false;
@@ -166,21 +189,24 @@ absl::Status CheckVertex(const ByteSource& source, const Element& vertex) {
 
 class AsciiBody {
  public:
-  AsciiBody(ByteSource* source, const PointCollector& points) : source_(source), points_(points) {}
+  AsciiBody(ByteSource* source, const std::array<LengthScale, 3>& scale)
+      : source_(source), scale_(scale) {}
 
-  // Reads the values of an element and sets its coordinates, scaled. White space separates values,
-  // line ends included: RealSense Viewer splits a vertex and its color over two lines.
-  absl::Status ReadElement(const Element& element, std::array<double, 3>* xyz) {
+  // Reads the values of an element and sets its coordinates, scaled, and its corners. White space
+  // separates values, line ends included: RealSense Viewer splits a vertex and its color over two
+  // lines.
+  absl::Status ReadElement(const Element& element, std::array<double, 3>* xyz, Corners* corners) {
     std::string_view token;
     for (const Property& property : element.properties) {
       if (!NextValue(&token)) return source_->Truncated("within the element " + element.name);
       if (property.count_type) {
-        if (absl::Status status = SkipList(element, token); !status.ok()) return status;
+        absl::Status status = ReadList(element, token, property.is_corners ? corners : nullptr);
+        if (!status.ok()) return status;
         continue;
       }
       // Other values, such as a "1.#QNAN" in a normal, are not checked.
       if (!property.axis) continue;
-      const NumberText kind = points_.Parse(token, *property.axis, &(*xyz)[*property.axis]);
+      const NumberText kind = scale_[*property.axis].Parse(token, &(*xyz)[*property.axis]);
       if (kind != NumberText::kNumber) return source_->ErrorAtLine(NumberProblem(kind, token));
     }
     return absl::OkStatus();
@@ -215,22 +241,30 @@ class AsciiBody {
     return true;
   }
 
-  absl::Status SkipList(const Element& element, std::string_view count_text) {
+  // Reads a list, and stores its items in `corners` unless it is null.
+  absl::Status ReadList(const Element& element, std::string_view count_text, Corners* corners) {
     uint64_t count = 0;
     if (!ParseUnsigned(count_text, &count)) {
       return source_->ErrorAtLine(absl::StrCat(Quoted(count_text), " is not the count of a list"));
     }
     std::string_view token;
     for (uint64_t i = 0; i < count; ++i) {
-      if (NextValue(&token)) continue;
-      return source_->Truncated(absl::StrCat("within the element ", element.name, ", after ", i,
-                                             " of ", count, " items of a list"));
+      if (!NextValue(&token)) {
+        return source_->Truncated(absl::StrCat("within the element ", element.name, ", after ", i,
+                                               " of ", count, " items of a list"));
+      }
+      if (corners == nullptr) continue;
+      const char* const end = token.data() + token.size();
+      const auto [stop, error] = std::from_chars(token.data(), end, corners->emplace_back());
+      if (stop != end || error != std::errc()) {
+        return source_->ErrorAtLine(Quoted(token) + " is not the index of a vertex");
+      }
     }
     return absl::OkStatus();
   }
 
   ByteSource* source_;
-  const PointCollector& points_;
+  const std::array<LengthScale, 3>& scale_;
   // Rest of the current line.
   std::string_view rest_;
 };
@@ -239,15 +273,14 @@ class BinaryBody {
  public:
   BinaryBody(ByteSource* source, bool big_endian) : source_(source), big_endian_(big_endian) {}
 
-  absl::Status ReadElement(const Element& element, std::array<double, 3>* xyz) {
+  absl::Status ReadElement(const Element& element, std::array<double, 3>* xyz, Corners* corners) {
     element_offset_ = source_->offset();
     for (const Property& property : element.properties) {
       double value = 0;
-      const bool complete =
-          property.count_type
-              ? ReadScalar(*property.count_type, &value) && value >= 0 &&
-                    source_->Skip(static_cast<uint64_t>(value) * SizeOf(property.type))
-              : ReadScalar(property.type, &value);
+      const bool complete = property.count_type
+                                ? ReadScalar(*property.count_type, &value) && value >= 0 &&
+                                      ReadList(property, static_cast<uint64_t>(value), corners)
+                                : ReadScalar(property.type, &value);
       if (value < 0 && property.count_type) {
         return source_->ErrorAtByte("the count of a list is negative");
       }
@@ -282,26 +315,130 @@ class BinaryBody {
     return true;
   }
 
+  // Returns false if the file ends within the list.
+  bool ReadList(const Property& property, uint64_t count, Corners* corners) {
+    if (corners == nullptr || !property.is_corners) {
+      return source_->Skip(count * SizeOf(property.type));
+    }
+    double value = 0;
+    for (uint64_t i = 0; i < count; ++i) {
+      if (!ReadScalar(property.type, &value)) return false;
+      // Clamps values beyond 2^62, which are out of range anyway.
+      corners->push_back(static_cast<int64_t>(std::min(value, 0x1p62)));
+    }
+    return true;
+  }
+
   ByteSource* source_;
   bool big_endian_;
   uint64_t element_offset_ = 0;
 };
 
-template <typename Body>
-absl::Status ReadBody(const PlyHeader& header, Body body, PointCollector* points) {
-  const auto error_at = [&body](const std::string& message) { return body.Error(message); };
+// Adds each vertex to a collector.
+class PointSink {
+ public:
+  explicit PointSink(PointCollector* points) : points_(points) {}
+
+  template <typename Body>
+  absl::Status AddVertex(const Body& body, const Element& vertex,
+                         const std::array<double, 3>& xyz) const {
+    const auto error_at = [&body](const std::string& message) { return body.Error(message); };
+    return Body::Add(xyz, vertex, error_at, points_);
+  }
+
+  // Faces are not needed.
+  static Corners* CornersOf(const Element& /*element*/) { return nullptr; }
+  template <typename Body>
+  static absl::Status AddFace(const Body& /*body*/, const Element& /*element*/, uint64_t /*i*/) {
+    return absl::OkStatus();
+  }
+
+ private:
+  PointCollector* points_;
+};
+
+// Adds vertices and faces to a mesh.
+class MeshSink {
+ public:
+  MeshSink(uint64_t vertex_count, TriangleMesh* mesh) : vertex_count_(vertex_count), mesh_(mesh) {}
+
+  template <typename Body>
+  absl::Status AddVertex(const Body& body, const Element& /*vertex*/,
+                         const std::array<double, 3>& xyz) const {
+    for (const double x : xyz) {
+      if (!std::isfinite(x)) return body.Error("a coordinate is not finite");
+    }
+    mesh_->vertices.push_back(xyz);
+    return absl::OkStatus();
+  }
+
+  Corners* CornersOf(const Element& element) {
+    corners_.clear();
+    return HoldsFaces(element) ? &corners_ : nullptr;
+  }
+
+  // Adds the face with the corners read: the `i`-th, from 0. In strips, -1 starts a new strip.
+  template <typename Body>
+  absl::Status AddFace(const Body& body, const Element& element, uint64_t i) {
+    const bool is_strip = element.name == kStrips;
+    std::vector<uint32_t> polygon;
+    for (const int64_t corner : corners_) {
+      if (is_strip && corner == -1) {
+        AddStrip(polygon);
+        polygon.clear();
+      } else if (corner < 0 || static_cast<uint64_t>(corner) >= vertex_count_) {
+        return body.Error(absl::StrCat(element.name, " ", i, " names vertex ", corner,
+                                       ", but the vertices are 0 to ", vertex_count_ - 1));
+      } else {
+        polygon.push_back(static_cast<uint32_t>(corner));
+      }
+    }
+    if (is_strip) {
+      AddStrip(polygon);
+    } else {
+      AddPolygon(polygon, mesh_);
+    }
+    return absl::OkStatus();
+  }
+
+ private:
+  // Every other triangle of a strip has the opposite orientation.
+  void AddStrip(const std::vector<uint32_t>& strip) {
+    for (size_t i = 2; i < strip.size(); ++i) {
+      const size_t odd = i % 2;
+      mesh_->triangles.push_back({strip[i - 2 + odd], strip[i - 1 - odd], strip[i]});
+    }
+  }
+
+  uint64_t vertex_count_;
+  TriangleMesh* mesh_;
+  Corners corners_;
+};
+
+template <typename Body, typename Sink>
+absl::Status ReadBody(const PlyHeader& header, Body body, Sink sink) {
   for (const Element& element : header.elements) {
     // An element without properties takes no bytes, regardless of its count.
     if (element.properties.empty()) continue;
     const bool is_vertex = element.name == "vertex";
     std::array<double, 3> xyz = {};
     for (uint64_t i = 0; i < element.count; ++i) {
-      absl::Status status = body.ReadElement(element, &xyz);
-      if (status.ok() && is_vertex) status = Body::Add(xyz, element, error_at, points);
+      Corners* const corners = sink.CornersOf(element);
+      absl::Status status = body.ReadElement(element, &xyz, corners);
+      if (status.ok() && is_vertex) status = sink.AddVertex(body, element, xyz);
+      if (status.ok() && corners != nullptr) status = sink.AddFace(body, element, i);
       if (!status.ok()) return status;
     }
   }
   return body.Finish();
+}
+
+template <typename Sink>
+absl::Status ReadBody(ByteSource* source, const PlyHeader& header,
+                      const std::array<LengthScale, 3>& scale, Sink sink) {
+  if (header.encoding == Encoding::kAscii) return ReadBody(header, AsciiBody(source, scale), sink);
+  const bool big_endian = header.encoding == Encoding::kBigEndian;
+  return ReadBody(header, BinaryBody(source, big_endian), sink);
 }
 
 // Returns the only element `vertex`.
@@ -330,11 +467,28 @@ absl::Status ReadPly(ByteSource* source, PointCollector* points) {
   PlyHeader header;
   if (absl::Status status = ParsePlyHeader(source, &header); !status.ok()) return status;
   if (const auto vertex = FindVertex(*source, header); !vertex.ok()) return vertex.status();
-  if (header.encoding == Encoding::kAscii) {
-    return ReadBody(header, AsciiBody(source, *points), points);
+  return ReadBody(source, header, points->scale(), PointSink(points));
+}
+
+absl::Status ReadPlyMesh(ByteSource* source, TriangleMesh* mesh) {
+  PlyHeader header;
+  if (absl::Status status = ParsePlyHeader(source, &header); !status.ok()) return status;
+  const auto vertex = FindVertex(*source, header);
+  if (!vertex.ok()) return vertex.status();
+  bool has_faces = false;
+  for (const Element& element : header.elements) {
+    if (element.count == 0 || (element.name != kFaces && element.name != kStrips)) continue;
+    if (!HoldsFaces(element)) {
+      return source->ErrorAtLine(
+          absl::StrCat("the element ", element.name, " has no list vertex_indices of integers"));
+    }
+    has_faces = true;
   }
-  const bool big_endian = header.encoding == Encoding::kBigEndian;
-  return ReadBody(header, BinaryBody(source, big_endian), points);
+  if (!has_faces) return absl::OkStatus();
+  if ((*vertex)->count > std::numeric_limits<uint32_t>::max()) {
+    return source->ErrorAtLine("too many vertices");
+  }
+  return ReadBody(source, header, {}, MeshSink((*vertex)->count, mesh));
 }
 
 }  // namespace hulld

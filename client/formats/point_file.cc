@@ -85,13 +85,14 @@ absl::StatusOr<PointFormat> PointFormatOfPath(const std::string& path) {
     if (auto format = PointFormatFromName(file.substr(dot + 1)); format.ok()) return format;
   }
   return absl::InvalidArgumentError(
-      absl::StrCat(path, ": unknown file extension; set the format with --format (",
-                   absl::StrJoin(PointFormatNames(), ", "), ")"));
+      absl::StrCat(path, ": unknown file extension; convert or rename the file; supported are ",
+                   absl::StrJoin(PointFormatNames(), ", ")));
 }
 
 bool IsMeshFormat(PointFormat format) {
   return format == PointFormat::kObj || format == PointFormat::kOff ||
-         format == PointFormat::kStl || format == PointFormat::kGltf || format == PointFormat::kDae;
+         format == PointFormat::kPly || format == PointFormat::kStl ||
+         format == PointFormat::kGltf || format == PointFormat::kDae;
 }
 
 absl::StatusOr<ReadCounts> ReadPoints(const ReadRequest& request, const BlockReceiver& receive) {

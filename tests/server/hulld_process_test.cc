@@ -14,6 +14,7 @@
 #include <sstream>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "client/appender.h"
@@ -100,6 +101,19 @@ TEST(HulldProgram, APortInUseAndAnInvalidFlagAreFatal) {
   Process fourth({"--store", "memory", "--listen", "0.0.0.0:0"});
   EXPECT_NE(fourth.ReadLineWith("--insecure"), "");
   EXPECT_EQ(fourth.Wait(), 1);
+}
+
+TEST(HulldProgram, AnAddressInUseCreatesNoDirectory) {
+  Process first({"--store", "memory", "--listen", "127.0.0.1:0"});
+  const std::string address = AddressIn(first.ReadLineWith("listening on "));
+  const std::string directory = ::testing::TempDir() + "/hulld_address_in_use";
+  const std::string free = "127.0.0.1:0";
+  for (const auto& [listen, metrics] : {std::pair(address, free), std::pair(free, address)}) {
+    Process second({"--data-dir", directory, "--listen", listen, "--metrics-address", metrics});
+    EXPECT_NE(second.ReadLineWith("the port is in use"), "");
+    EXPECT_EQ(second.Wait(), 1);
+    EXPECT_FALSE(std::filesystem::exists(directory)) << metrics;
+  }
 }
 
 TEST(HulldProgram, AnIdleStreamDoesNotOutliveTheDrainTimeout) {

@@ -1,11 +1,11 @@
 // XYZ and PTS: one line per point, x y z and further columns. A number of points may precede each
-// scan, as Leica and CloudCompare write it.
-#include <absl/strings/ascii.h>
+// scan, as Leica and CloudCompare write it. A file with a header is read as a table.
 #include <absl/strings/str_cat.h>
 
 #include <array>
 #include <optional>
 
+#include "client/formats/csv_reader.h"
 #include "client/formats/point_file.h"
 #include "client/formats/text_number.h"
 
@@ -54,13 +54,6 @@ absl::Status AddPoint(const ByteSource& source, std::string_view line, PointColl
   return AddTextPoint(source, line, points);
 }
 
-// Returns true if the line starts with a name.
-bool StartsWithName(std::string_view line) {
-  double number = 0;
-  return (line[0] == '"' || absl::ascii_isalpha(static_cast<unsigned char>(line[0]))) &&
-         ParseDouble(NextToken(&line), &number) == NumberText::kNoNumber;
-}
-
 }  // namespace
 
 absl::Status ReadXyz(ByteSource* source, PointCollector* points) {
@@ -68,10 +61,22 @@ absl::Status ReadXyz(ByteSource* source, PointCollector* points) {
   std::optional<uint64_t> declared;
   uint64_t found = 0;
   bool first = true;
+  std::optional<CsvLayout> commented;
   for (std::string_view line; source->ReadLine(&line);) {
     const std::string_view content = Trim(WithoutComment(line));
-    // CloudCompare writes a header //X Y Z.
-    if (content.empty() || content.substr(0, 2) == "//") continue;
+    if (content.empty() || IsCsvComment(content)) {
+      if (first && !commented) commented = CsvHeaderInComment(*source, Trim(line));
+      continue;
+    }
+    if (first && commented && commented->columns != CsvLayout().columns &&
+        IsRowOf(*commented, line)) {
+      return ReadCsvRows(source, *commented, line, points);
+    }
+    if (first) {
+      const auto header = CsvHeader(*source, content);
+      if (!header.ok()) return header.status();
+      if (header->has_value()) return ReadCsvRows(source, **header, "", points);
+    }
     uint64_t count = 0;
     const bool is_complete = declared && found == *declared;
     if ((first || is_complete) && ParseUnsigned(content, &count)) {
@@ -81,9 +86,7 @@ absl::Status ReadXyz(ByteSource* source, PointCollector* points) {
       return source->ErrorAtLine(absl::StrCat("the scan has more lines than the ",
                                               Counted(*declared, "point"), " it declares"));
     } else if (absl::Status added = AddPoint(*source, content, points); !added.ok()) {
-      if (!first || !StartsWithName(content)) return added;
-      return absl::InvalidArgumentError(
-          absl::StrCat(added.message(), "; --format csv reads tables with a header"));
+      return added;
     } else {
       ++found;
     }

@@ -47,7 +47,10 @@ namespace {
 absl::StatusOr<PointFormat> FormatOf(const std::string& path, const std::string& named) {
   if (!named.empty()) return PointFormatFromName(named);
   if (path == "-") return PointFormat::kXyz;
-  return PointFormatOfPath(path);
+  auto format = PointFormatOfPath(path);
+  if (format.ok()) return format;
+  return absl::InvalidArgumentError(
+      absl::StrCat(format.status().message(), "; or set the format with --format"));
 }
 
 }  // namespace

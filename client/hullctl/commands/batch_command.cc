@@ -97,6 +97,7 @@ class BatchRun {
     head_.Clear();
     versions_.clear();
     piece_hulls_.clear();
+    problems_.clear();
     return AskBatch(
         client_, request,
         [&](const v1::BatchCheckCollisionsResponse& part) {
@@ -112,6 +113,9 @@ class BatchRun {
   void TakeHead(const v1::BatchCheckCollisionsResponse& part) {
     if (part.has_header()) *head_.mutable_header() = part.header();
     head_.mutable_hulls()->MergeFrom(part.hulls());
+    for (const v1::PlacementProblem& problem : part.placement_problems()) {
+      problems_[problem.placement()] = problem;
+    }
     for (const v1::HullVersion& hull : part.piece_hulls()) {
       piece_hulls_.push_back(hull);
       versions_[hull.hull_id()] = &piece_hulls_.back();
@@ -121,8 +125,11 @@ class BatchRun {
   // pair: its index in the current call.
   absl::Status Take(size_t pair, const AnswerRow& row, const std::string* problem) {
     std::optional<Verification> verification;
+    std::string text;
     if (problem != nullptr) {
       ++failed_;
+      text = ProblemText(pair, *problem);
+      problem = &text;
     } else if (arguments_.details.verify) {
       auto verified = Verify(row, pair);
       if (!verified.ok()) return verified.status();
@@ -131,6 +138,16 @@ class BatchRun {
     Print(row, first_ + pair, problem, verification);
     bar_.Update(first_ + pair + 1);
     return absl::OkStatus();
+  }
+
+  // Returns the message of a pair without an answer. pair: its index in the current call.
+  std::string ProblemText(size_t pair, const std::string& message) const {
+    for (const size_t side : {2 * pair, 2 * pair + 1}) {
+      const auto found = problems_.find(request_->pairs(static_cast<int>(side)));
+      if (found == problems_.end()) continue;
+      return scene_.ProblemText(*scene_.HullOf(pairs_[2 * first_ + side]), found->second);
+    }
+    return scene_.InKeys(message);
   }
 
   absl::StatusOr<Verification> Verify(const AnswerRow& row, size_t pair) {
@@ -260,6 +277,8 @@ class BatchRun {
   // Hulls of the pieces of bodies, and their index by ID.
   std::deque<v1::HullVersion> piece_hulls_;
   HullVersions versions_;
+  // Problems of the current call, by placement of its request.
+  std::unordered_map<uint32_t, v1::PlacementProblem> problems_;
   const v1::BatchCheckCollisionsRequest* request_ = nullptr;
   // First pair of the current call.
   size_t first_ = 0;
@@ -297,7 +316,7 @@ ExitCode AnswerPairs(const Invocation& run, const std::string& file, const Scene
   const auto pairs = PairsOf(scene, file);
   if (!pairs.ok()) return run.FailUsage(pairs.status());
   BatchRun batch(run, arguments, scene, *pairs);
-  if (absl::Status status = batch.Run(); !status.ok()) return run.Fail(status);
+  if (absl::Status status = batch.Run(); !status.ok()) return run.Fail(scene.InKeys(status));
   const auto report = [&](uint64_t count, const char* what) {
     if (count == 0) return false;
     run.err << "hullctl: " << count << " of " << pairs->size() / 2 << " pairs " << what << "\n";

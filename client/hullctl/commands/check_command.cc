@@ -1,11 +1,13 @@
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <functional>
 #include <initializer_list>
 #include <memory>
 #include <optional>
 #include <string>
+#include <system_error>
 #include <utility>
 
 #include "client/formats/point_file.h"
@@ -298,14 +300,17 @@ absl::Status RefuseConflicts(const PairArguments& arguments) {
   return absl::OkStatus();
 }
 
-// Returns the error. If the server does not know an ID that looks like the name of a file, adds
-// that there is no such file.
+// Returns the error. If the server does not know an ID that looks like the name of a file, adds why
+// no file of that name was read.
 absl::Status WithFileHint(const absl::Status& error, const PairArguments& arguments) {
   for (const std::string& name : {arguments.a, arguments.b}) {
-    if (!absl::IsNotFound(error) || !PointFormatOfPath(name).ok() || IsShapeFile(name)) continue;
     const std::string missing = absl::StrCat("hull ", Quoted(name), " not found");
-    if (error.message() != missing) continue;
-    return absl::NotFoundError(absl::StrCat(missing, ", and no such file"));
+    if (!absl::IsNotFound(error) || error.message() != missing || IsShapeFile(name)) continue;
+    const auto format = PointFormatOfPath(name);
+    std::error_code ignored;
+    if (format.ok()) return absl::NotFoundError(missing + ", and no such file");
+    if (!std::filesystem::is_regular_file(name, ignored)) continue;
+    return absl::NotFoundError(absl::StrCat(missing, "; ", format.status().message()));
   }
   return error;
 }
@@ -411,8 +416,8 @@ void AddCheckCommand(Command program, Invocation* invocation) {
   v1::CheckCollisionRequest* const request = &arguments->request;
   Command command = program.AddCommand("check", "Check two hulls, bodies, or files for collision");
   constexpr char kSideHelp[] = "ID of a hull or body, or a file with points";
-  command.AddText("A", &arguments->a, kSideHelp).Required().Completes(ValueKind::kPlaced);
-  command.AddText("B", &arguments->b, kSideHelp).Completes(ValueKind::kPlaced);
+  command.AddText("A", &arguments->a, kSideHelp).Required().Completes(ValueKind::kShape);
+  command.AddText("B", &arguments->b, kSideHelp).Completes(ValueKind::kShape);
   AddPoseOptions(command, arguments.get());
   command.AddLength("--radius-a", "Grow A by a ball of this radius: a point becomes a sphere",
                     [request](double radius) { request->mutable_a()->set_radius(radius); });

@@ -49,12 +49,16 @@ class SceneRun {
     if (run_.json()) run_.out << MessageJson(part) << "\n";
     for (const v1::PlacementProblem& problem : part.placement_problems()) {
       ++placement_problems_;
+      const std::string* const id = scene_.HullOf(problem.placement());
+      if (id == nullptr) {
+        return absl::InternalError("the answer refers to a placement that does not exist");
+      }
       run_.err << "hullctl: placement " << scene_.NameOf(problem.placement()) << ": "
-               << problem.message() << "\n";
+               << scene_.ProblemText(*id, problem) << "\n";
     }
     std::unordered_map<uint64_t, std::string> problems;
     for (const v1::PairProblem& problem : part.columns().pair_problems()) {
-      problems[problem.row()] = problem.message();
+      problems[problem.row()] = scene_.InKeys(problem.message());
     }
     const int count = part.pairs_size() / 2;
     if (part.pairs_size() % 2 != 0 || !AreParallel(part.columns(), static_cast<size_t>(count))) {
@@ -157,7 +161,7 @@ ExitCode Find(const Invocation& run, const SceneArguments& arguments, Scene* rea
   if (arguments.first) read->request.set_first_only(true);
   if (arguments.every_piece) read->request.set_every_piece(true);
   SceneRun scene(run, *read);
-  if (absl::Status status = scene.Run(); !status.ok()) return run.Fail(status);
+  if (absl::Status status = scene.Run(); !status.ok()) return run.Fail(read->InKeys(status));
   if (scene.failed() == 0) return ExitCode::kDone;
   run.err << "hullctl: " << Counted(scene.failed(), "placement or pair", "placements or pairs")
           << " failed\n";

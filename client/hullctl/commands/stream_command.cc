@@ -65,7 +65,9 @@ class StreamRun {
     }
     if (answer->placement_problems_size() > 0 || answer->hulls_size() > 0) problems_.clear();
     for (const v1::PlacementProblem& problem : answer->placement_problems()) {
-      problems_[problem.placement()] = problem.message();
+      const std::string* const id = scene_.HullOf(problem.placement());
+      problems_[problem.placement()] =
+          id == nullptr ? problem.message() : scene_.ProblemText(*id, problem);
     }
     PrintRows(*answer);
     return absl::OkStatus();
@@ -74,7 +76,7 @@ class StreamRun {
   void PrintRows(const v1::StreamCollisionsResponse& answer) {
     std::unordered_map<uint64_t, std::string> causes;
     for (const v1::PairProblem& problem : answer.columns().pair_problems()) {
-      causes[problem.row()] = problem.message();
+      causes[problem.row()] = scene_.InKeys(problem.message());
     }
     for (int i = 0; i < answer.pairs_size(); ++i) {
       const uint32_t a = pairs_[2 * answer.pairs(i)];
@@ -143,10 +145,10 @@ ExitCode Stream(const Invocation& run, const StreamArguments& arguments) {
     }
     status = stream.Update(std::move(update));
   }
-  if (!status.ok()) return run.Fail(status);
+  if (!status.ok()) return run.Fail(scene->InKeys(status));
   if (!(*source)->status().ok()) return run.FailUsage((*source)->status());
   status = stream.Close();
-  return status.ok() ? ExitCode::kDone : run.Fail(status);
+  return status.ok() ? ExitCode::kDone : run.Fail(scene->InKeys(status));
 }
 
 }  // namespace

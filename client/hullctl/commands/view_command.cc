@@ -400,7 +400,7 @@ void AddViewCommand(Command program, Invocation* invocation) {
       .AddTexts("ID|PREFIX|FILE", &arguments->things,
                 "IDs or prefixes of hulls and bodies, meshes, points, a scene, or a robot "
                 "(.urdf); default: all hulls and bodies")
-      .Completes(ValueKind::kPlaced);
+      .Completes(ValueKind::kShape);
   command.AddFlag("--demo", &arguments->demo,
                   "Show the demo scenes, keys 0 to 7, with temporary hulls");
   command

@@ -82,17 +82,18 @@ class Ending {
   const Interrupt interrupt_;
 };
 
-// Prints messages until the watch ends, the callback returns true, or Ctrl-C.
+// Prints messages until the watch ends, the callback returns true, or Ctrl-C. Returns the error
+// that ended the watch.
 template <typename Watch, typename Print>
-ExitCode PrintAll(const Invocation& run, std::unique_ptr<Watch> watch, const Print& print) {
+absl::Status PrintAll(const Invocation& run, std::unique_ptr<Watch> watch, const Print& print) {
   Ending<Watch> ending(std::move(watch));
   while (true) {
     const auto message = ending.watch().Next();
-    if (!message.ok()) return ending.is_ended() ? ExitCode::kDone : run.Fail(message.status());
+    if (!message.ok()) return ending.is_ended() ? absl::OkStatus() : message.status();
     if (run.json()) run.out << MessageJson(*message) << "\n";
     const bool is_enough = print(*message);
     run.out << std::flush;
-    if (is_enough) return ExitCode::kDone;
+    if (is_enough) return absl::OkStatus();
   }
 }
 
@@ -107,7 +108,8 @@ ExitCode WatchHulls(const Invocation& run, const WatchOptions& options) {
     return (options.events > 0 && events >= options.events) ||
            (options.until_synced && message.synced());
   };
-  return PrintAll(run, run.MakeClient().WatchHulls(request), print);
+  const absl::Status status = PrintAll(run, run.MakeClient().WatchHulls(request), print);
+  return status.ok() ? ExitCode::kDone : run.Fail(status);
 }
 
 // Returns the watch of a scene with fixed poses.
@@ -154,8 +156,9 @@ ExitCode WatchScene(const Invocation& run, const WatchOptions& options) {
   bool is_synced = false;
   const auto print = [&](const v1::WatchCollisionsResponse& message) {
     for (const v1::PlacementProblem& problem : message.placement_problems()) {
-      run.err << "hullctl: placement " << name(problem.placement()) << ": " << problem.message()
-              << "\n";
+      const std::string* const id = scene->HullOf(problem.placement());
+      run.err << "hullctl: placement " << name(problem.placement()) << ": "
+              << (id == nullptr ? problem.message() : scene->ProblemText(*id, problem)) << "\n";
     }
     for (const v1::CollisionEvent& event : message.events()) {
       if (run.json()) break;
@@ -175,7 +178,9 @@ ExitCode WatchScene(const Invocation& run, const WatchOptions& options) {
     events += static_cast<uint64_t>(message.events_size());
     return (options.events > 0 && events >= options.events) || (options.until_synced && is_synced);
   };
-  return PrintAll(run, run.MakeClient().WatchCollisions(OpenOf(*scene)), print);
+  const absl::Status status =
+      PrintAll(run, run.MakeClient().WatchCollisions(OpenOf(*scene)), print);
+  return status.ok() ? ExitCode::kDone : run.Fail(scene->InKeys(status));
 }
 
 }  // namespace

@@ -94,9 +94,11 @@ void OfferValues(const OptionDescription& option, const std::string& start,
     case ValueKind::kHull:
     case ValueKind::kBody:
     case ValueKind::kPlaced:
+    case ValueKind::kShape:
     case ValueKind::kContext:
       break;
   }
+  completion->files = option.value_kind == ValueKind::kShape;
   for (Candidate& value : values(option.value_kind, start)) {
     value.text = front + value.text;
     completion->candidates.push_back(std::move(value));

@@ -8,15 +8,16 @@
 
 namespace hulld {
 
-// Kind of a value, for completion. kPlaced: a hull or a body.
-enum class ValueKind { kText, kFile, kDirectory, kHull, kBody, kPlaced, kContext };
+// Kind of a value, for completion. kPlaced: a hull or a body. kShape: a hull, a body, or a file.
+enum class ValueKind { kText, kFile, kDirectory, kHull, kBody, kPlaced, kShape, kContext };
 
 // An option, a flag, or a positional argument.
 struct OptionDescription {
   // "-o" and "--out"; a single name without a dash, such as "FILE", is an argument.
   std::vector<std::string> names;
   std::string help;
-  // Name of the value; empty for a flag.
+  // Name of the value; empty for a flag. For an argument: its text in the usage, if that is not its
+  // name.
   std::string value_name;
   // Environment variable that also sets the value, if any.
   std::string variable;

@@ -74,18 +74,24 @@ std::vector<CommandGroup> GroupsOf(const CommandDescription& command) {
 }
 
 std::string UsageText(const CommandDescription& command) {
-  std::string text = command.path;
-  if (!command.commands.empty()) absl::StrAppend(&text, " COMMAND");
+  std::string arguments;
   for (const OptionDescription& option : command.options) {
     if (!option.is_argument() || option.hidden) continue;
-    const std::string name = option.names.front() + (option.repeated ? "..." : "");
-    absl::StrAppend(&text, " ", option.required ? name : "[" + name + "]");
+    const std::string name = OptionHeading(option);
+    absl::StrAppend(&arguments, " ", option.required ? name : "[" + name + "]");
   }
-  return text + " [OPTIONS]";
+  // 'hullctl scene' works with a command and without.
+  const char* const below = command.commands.empty() ? ""
+                            : arguments.empty()      ? " COMMAND"
+                                                     : " [COMMAND]";
+  return command.path + below + arguments + " [OPTIONS]";
 }
 
 std::string OptionHeading(const OptionDescription& option) {
-  if (option.is_argument()) return option.names.front() + (option.repeated ? "..." : "");
+  if (option.is_argument()) {
+    if (!option.value_name.empty()) return option.value_name;
+    return option.names.front() + (option.repeated ? "..." : "");
+  }
   // Aligns long names.
   std::string text = option.names.size() > 1 ? "" : "    ";
   absl::StrAppend(&text, absl::StrJoin(option.names, ", "));

@@ -45,10 +45,11 @@ std::string Flowing(const std::string& text) {
 void AppendOptionItems(const CommandDescription& command, bool arguments, std::string* page) {
   for (const OptionDescription& option : command.options) {
     if (option.hidden || option.is_argument() != arguments) continue;
-    std::vector<std::string> names;
-    for (const std::string& name : option.names) names.push_back("\\fB" + Escaped(name) + "\\fR");
-    absl::StrAppend(page, ".TP\n", absl::StrJoin(names, ", "), option.repeated ? "..." : "");
-    if (!option.value_name.empty()) {
+    std::vector<std::string> names = option.names;
+    if (arguments) names = {OptionHeading(option)};
+    for (std::string& name : names) name = "\\fB" + Escaped(name) + "\\fR";
+    absl::StrAppend(page, ".TP\n", absl::StrJoin(names, ", "));
+    if (!arguments && !option.value_name.empty()) {
       absl::StrAppend(page, " \\fI", Escaped(option.value_name), "\\fR");
     }
     absl::StrAppend(page, "\n", Escaped(OptionHelp(option)), ".\n");

@@ -178,9 +178,10 @@ void AddCoverCommand(Command program, Invocation* invocation) {
   Command command = program.AddCommand("cover", "Check whether hulls or a body enclose a mesh");
   command
       .AddTexts("ID", &arguments->words,
-                "IDs of hulls or bodies, then the mesh (obj, off, stl, gltf, dae)")
+                "IDs of hulls or bodies, then the mesh (obj, off, ply, stl, gltf, dae)")
+      .ValueName("ID... FILE")
       .Required()
-      .Completes(ValueKind::kPlaced);
+      .Completes(ValueKind::kShape);
   command.AddNumber(
       "--limit", 0, kAnyNumber,
       absl::StrCat("Triangles to list, the farthest first (default ", kDefaultLimit, ")"),

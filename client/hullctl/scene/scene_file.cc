@@ -1,7 +1,10 @@
 #include "client/hullctl/scene/scene_file.h"
 
+#include <absl/strings/cord.h>
+#include <absl/strings/numbers.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
+#include <absl/strings/str_replace.h>
 
 #include <algorithm>
 #include <cctype>
@@ -323,6 +326,48 @@ std::array<std::string, 2> Scene::NamesOfPieces(uint32_t a, uint32_t b,
     return static_cast<size_t>(piece) < named.size() ? named[static_cast<size_t>(piece)] : "";
   };
   return {name(a, pieces.first), name(b, pieces.second)};
+}
+
+std::string Scene::InKeys(const std::string& message) const {
+  if (names.empty()) return message;
+  std::string text = absl::StrReplaceAll(message, {{"wanted.", "ask."},
+                                                   {"an end_pose", "a \"to\""},
+                                                   {"].end_pose is set", "] has a \"to\""},
+                                                   {"end_pose", "\"to\""},
+                                                   {"METHOD_TEXTBOOK_SAT", "--textbook"},
+                                                   {"first_only", "--first"},
+                                                   {"every_piece", "--every-piece"},
+                                                   {"and limit ", "and --nearest "},
+                                                   {"use CheckCollision, BatchCheckCollisions, or "
+                                                    "FindCollisions",
+                                                    "use 'hullctl batch' or 'hullctl scene'"}});
+  // Updates of a stream have placements of their own.
+  const size_t at = text.starts_with("open: ") ? 6 : 0;
+  constexpr std::string_view kPlacements = "placements[";
+  const size_t begin = at + kPlacements.size();
+  const size_t end = text.find(']');
+  uint32_t index = 0;
+  if (text.compare(at, kPlacements.size(), kPlacements) == 0 && end != std::string::npos &&
+      absl::SimpleAtoi(text.substr(begin, end - begin), &index) && index < names.size()) {
+    text.replace(at, end + 1 - at, "placement " + names[index]);
+  }
+  return text;
+}
+
+absl::Status Scene::InKeys(const absl::Status& status) const {
+  if (status.ok()) return status;
+  absl::Status renamed(status.code(), InKeys(std::string(status.message())));
+  status.ForEachPayload([&renamed](absl::string_view type, const absl::Cord& payload) {
+    renamed.SetPayload(type, payload);
+  });
+  return renamed;
+}
+
+std::string Scene::ProblemText(const std::string& id, const v1::PlacementProblem& problem) const {
+  const bool is_missing = problem.code() == static_cast<int>(absl::StatusCode::kNotFound);
+  return absl::StrCat(InKeys(problem.message()), is_missing && defined_ids.contains(id)
+                                                     ? "; 'hullctl scene apply' creates it"
+                                                     : "");
 }
 
 absl::StatusOr<Scene> ReadScene(ByteSource* source, BodyForm form) {

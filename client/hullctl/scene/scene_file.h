@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -40,6 +41,8 @@ struct Scene {
   // of each body.
   std::vector<int> body_of;
   std::vector<std::vector<std::string>> piece_names;
+  // IDs of the hulls and bodies that a YAML scene defines.
+  std::set<std::string> defined_ids;
 
   uint32_t size() const;
   // Returns the hull of a placement, empty for an inline shape; null if the placement does not
@@ -54,6 +57,13 @@ struct Scene {
   // empty if it has none.
   std::array<std::string, 2> NamesOfPieces(uint32_t a, uint32_t b,
                                            std::pair<int32_t, int32_t> pieces) const;
+  // Returns a message or error of the server with the keys and names of the YAML scene in place of
+  // the fields of the contract; unchanged for other scenes.
+  std::string InKeys(const std::string& message) const;
+  absl::Status InKeys(const absl::Status& status) const;
+  // Returns the message of a problem with a placement of the hull or body `id`, with a remedy if
+  // the file defines it.
+  std::string ProblemText(const std::string& id, const v1::PlacementProblem& problem) const;
 };
 
 // Maximum number of pairs queried from one file.

@@ -46,6 +46,15 @@ class DocumentStart : public YAML::EventHandler {
   YAML::Mark mark_;
 };
 
+// Returns advice if a line starts with a tab, which YAML does not allow as indentation.
+std::string TabAdvice(const std::string& text) {
+  const size_t tab = text.find("\n\t");
+  if (tab == std::string::npos) return "";
+  const auto end = text.begin() + static_cast<ptrdiff_t>(tab);
+  return absl::StrCat("; line ", std::count(text.begin(), end, '\n') + 2,
+                      " starts with a tab; indent with spaces");
+}
+
 }  // namespace
 
 absl::StatusOr<YamlReader> YamlReader::Parse(const std::string& text, const std::string& name) {
@@ -64,8 +73,8 @@ absl::StatusOr<YamlReader> YamlReader::Parse(const std::string& text, const std:
     while (documents < 2 && parser.HandleNextDocument(last)) ++documents;
     if (documents == 1) root = YAML::Load(text);
   } catch (const YAML::Exception& problem) {
-    return absl::InvalidArgumentError(
-        absl::StrCat(PlaceText(name, problem.mark), ": not valid YAML: ", problem.msg));
+    return absl::InvalidArgumentError(absl::StrCat(
+        PlaceText(name, problem.mark), ": not valid YAML: ", problem.msg, TabAdvice(text)));
   } catch (const std::exception& problem) {
     return absl::InvalidArgumentError(absl::StrCat(name, ": not valid YAML: ", problem.what()));
   }

@@ -643,7 +643,9 @@ absl::StatusOr<Scene> ToScene(const SceneDescription& description, const std::st
   for (const BodyDefinition& body : description.bodies) {
     std::vector<std::string>& names = scene.piece_names.emplace_back();
     for (const PieceDefinition& piece : body.pieces) names.push_back(piece.name);
+    scene.defined_ids.insert(body.body_id);
   }
+  for (const HullDefinition& hull : description.hulls) scene.defined_ids.insert(hull.hull_id);
   const Classes classes(description);
   const size_t count = description.placements.size();
   std::vector<size_t> order(description.movers.begin(), description.movers.end());

@@ -81,8 +81,9 @@ absl::StatusOr<FileShape> ReadShape(const std::string& path) {
   if (!format.ok()) return format.status();
   FileShape shape;
   shape.name = ShownName(path);
-  const absl::Status read =
-      IsMeshFormat(*format) ? ReadMeshShape(path, &shape) : ReadPointShape(path, *format, &shape);
+  absl::Status read = IsMeshFormat(*format) ? ReadMeshShape(path, &shape) : absl::OkStatus();
+  // A PLY file without faces is a cloud.
+  if (read.ok() && shape.xyz.empty()) read = ReadPointShape(path, *format, &shape);
   if (!read.ok()) return read;
   return shape;
 }
@@ -109,8 +110,9 @@ bool IsSceneFile(const std::string& path) {
     const std::string_view text = Trim(line);
     if (text.empty() || text.front() == '#') continue;
     // Lines of the former format are refused with their YAML equivalent.
-    return text.front() == '{' || text.find(':') != std::string_view::npos ||
-           text.starts_with("place ");
+    // The colon of ParaView's column Points:0 is no mapping.
+    return text.front() == '{' || text.ends_with(':') ||
+           text.find(": ") != std::string_view::npos || text.starts_with("place ");
   }
   return false;
 }

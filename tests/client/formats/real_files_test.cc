@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <sstream>
+#include <utility>
 
 #include "client/formats/mesh_file.h"
 #include "tests/client/formats/point_reading.h"
@@ -72,6 +73,17 @@ TEST(RealFiles, OddObjModelsOfAssimp) {
   EXPECT_THAT(ReadPath(Models() / "OBJ/number_formats.obj").error(),
               HasSubstr("number_formats.obj:11: \"3.1+e2\" is not a number"));
   EXPECT_THAT(ReadPath(Models() / "OBJ/box_UTF16BE.obj").error(), HasSubstr("iconv"));
+}
+
+TEST(RealFiles, PlyMeshesOfAssimp) {
+  SKIP_WITHOUT(Models());
+  for (const auto& [name, triangles] :
+       {std::pair("Wuson.ply", 3732u), std::pair("cube.ply", 12u),
+        std::pair("cube_binary.ply", 12u), std::pair("points.ply", 0u)}) {
+    const auto mesh = ReadMesh((Models() / "PLY" / name).string());
+    ASSERT_TRUE(mesh.ok()) << mesh.status();
+    EXPECT_EQ(mesh->triangles.size(), triangles) << name;
+  }
 }
 
 TEST(RealFiles, OffModelsOfAssimp) {

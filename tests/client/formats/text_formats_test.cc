@@ -105,11 +105,33 @@ TEST(XyzFile, NumbersMayBeSeparatedByCommasOrSemicolons) {
   }
 }
 
-TEST(XyzFile, AHeaderIsAnErrorThatNamesTheFormatOfTables) {
-  EXPECT_EQ(ReadText("x y z\n1 2 3\n", PointFormat::kXyz).error(),
-            "FILE:1: \"x\" is not a number; --format csv reads tables with a header");
-  EXPECT_THAT(ReadText("1,5 2,5 3,5\n", PointFormat::kXyz).error(),
-              testing::EndsWith("a point as the decimal mark"));
+// A header was refused with the advice to use --format csv.
+TEST(XyzFile, AHeaderNamesTheColumns) {
+  for (const char* text :
+       {"x y z\n1 2 3\n", "\nX,Y,Z\n1,2,3\n", "id;z;y;x\n7;3;2;1\n", "x\ty\tz\n1\t2\t3\n",
+        "x y z\n1\t2  3\n", "# saved today\nt z y x\n0 3 2 1\n", "# t x y z\n0 1 2 3\n",
+        "// t,x,y,z\n0,1,2,3\n", "# columns: x y z\n1 2 3\n", "//X Y Z R\n1\n1 2 3 9\n",
+        "\"Points:0\",\"Points:1\",\"Points:2\",\"T\"\n1,2,3,nan\n"}) {
+    for (const PointFormat format : {PointFormat::kXyz, PointFormat::kCsv}) {
+      // Only XYZ has counts.
+      if (format == PointFormat::kCsv && text[0] == '/' && text[2] == 'X') continue;
+      const PointsRead read = ReadText(text, format);
+      EXPECT_TRUE(read.status.ok()) << read.status << "\n" << text;
+      EXPECT_THAT(read.xyz(), ElementsAre(1, 2, 3)) << text;
+    }
+  }
+}
+
+TEST(XyzFile, AnAmbiguousHeaderIsAnError) {
+  for (const PointFormat format : {PointFormat::kXyz, PointFormat::kCsv}) {
+    EXPECT_EQ(ReadText("x,y,z,X\n1,2,3,4\n", format).error(),
+              "FILE:1: the header \"x,y,z,X\" names x in columns 1 and 4; it must name x, y and z "
+              "once");
+    EXPECT_THAT(ReadText("Points:0,Points:1,Points:2,z\n1,2,3,4\n", format).error(),
+                HasSubstr("names z in columns 3 and 4"));
+    EXPECT_EQ(ReadText("a b c\n1 2 3\n", format).error(),
+              "FILE:1: the header \"a b c\" has no column \"x\"; it must name x, y and z");
+  }
 }
 
 TEST(XyzFile, CommasThatMayBeDecimalMarksAreErrors) {
@@ -118,8 +140,6 @@ TEST(XyzFile, CommasThatMayBeDecimalMarksAreErrors) {
               HasSubstr("FILE:1: \"1,5 2,5 3,5\" has white space and \",\" between its numbers"));
   EXPECT_THAT(error("1 2 3\n1,2,3 255 0 0\n"), HasSubstr("FILE:2:"));
   EXPECT_THAT(error("1,5;2,5;3,5\n"), HasSubstr("use a point as the decimal mark"));
-  EXPECT_THAT(error("x,y,z\n1,2,3\n"),
-              HasSubstr("\"x\" is not a number; --format csv reads tables with a header"));
   EXPECT_THAT(error("1,,3\n"), HasSubstr("\"\" is not a number"));
   EXPECT_EQ(error("1,2\n"), "FILE:1: a point needs 3 coordinates, got 2");
 }
@@ -251,7 +271,7 @@ TEST(CsvFile, ErrorsNameFileAndLine) {
   EXPECT_EQ(ReadText("1,2\n", PointFormat::kCsv).error(),
             "FILE:1: the row has 2 columns; z is column 3");
   EXPECT_EQ(ReadText("a,b,c\n1,2,3\n", PointFormat::kCsv).error(),
-            "FILE:1: the header has no column \"x\"; it must name x, y and z");
+            "FILE:1: the header \"a,b,c\" has no column \"x\"; it must name x, y and z");
   EXPECT_EQ(ReadText("1,5;2,5;3,5\n", PointFormat::kCsv).error(),
             "FILE:1: \"1,5\" is not a number (use a point as the decimal mark)");
   EXPECT_EQ(ReadText("1,,3\n", PointFormat::kCsv).error(), "FILE:1: \"\" is not a number");
@@ -415,7 +435,8 @@ TEST(Formats, AreRecognizedByExtensionInAnyCase) {
   EXPECT_EQ(*PointFormatOfPath("/a.b/C.OBJ"), PointFormat::kObj);
   EXPECT_EQ(*PointFormatOfPath("x.glb"), PointFormat::kGltf);
   EXPECT_THAT(std::string(PointFormatOfPath("/a.obj/file").status().message()),
-              HasSubstr("--format"));
+              HasSubstr("/a.obj/file: unknown file extension; convert or rename the file; "
+                        "supported are obj, off, "));
   EXPECT_FALSE(PointFormatOfPath("x.docx").ok());
 }
 

@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
 #include <map>
 #include <random>
 #include <sstream>
@@ -62,6 +63,17 @@ TEST_F(HullctlQuestions, ValuesFromAListTakeAnyLetterCase) {
       Ask({"append", "cloud", file.path(), "--create", "--format", "Xyz", "--output", "JSON"});
   EXPECT_EQ(ran.code, 0) << ran.err;
   EXPECT_THAT(ran.out, HasSubstr("\"opened\""));
+}
+
+// Commands without --format recommended it, too.
+TEST_F(HullctlQuestions, OnlyCommandsWithAFormatOptionRecommendIt) {
+  Put("cube", server::Cube());
+  const TempFile file("part.step", "ISO-10303-21;\n");
+  EXPECT_THAT(Ask({"append", "cube", file.path()}).err,
+              HasSubstr("rgb; or set the format with --format\n"));
+  const Ran cover = Ask({"cover", "cube", file.path()});
+  EXPECT_THAT(cover.err, HasSubstr("convert or rename the file; supported are obj, "));
+  EXPECT_THAT(cover.err, Not(HasSubstr("--format")));
 }
 
 TEST_F(HullctlQuestions, VerifyDistinguishesValidInvalidAndUncheckable) {
@@ -456,6 +468,11 @@ TEST_F(HullctlQuestions, AFileThatDoesNotExistIsNotOnlyAMissingHull) {
                            (std::string(name) == "part" ? "" : ", and no such file") +
                            " (see 'hullctl list')\n");
   }
+  const std::string step = "hulld_" + std::to_string(getpid()) + ".step";
+  std::ofstream(step) << "ISO-10303-21;\n";
+  const Ran ran = Ask({"check", step, "cube"});
+  std::filesystem::remove(step);
+  EXPECT_THAT(ran.err, HasSubstr("\" not found; " + step + ": unknown file extension; convert"));
 }
 
 TEST_F(HullctlQuestions, AMeshIsNotWrittenUnderTheNameOfAnotherFormat) {

@@ -144,7 +144,7 @@ TEST_F(HullctlTest, AMistypedWordGetsASuggestion) {
             "hullctl: unexpected argument \"b\"; usage: hullctl create ID [OPTIONS]");
   EXPECT_EQ(error({"scene", "chek", "a"}),
             "hullctl: unexpected argument \"a\"; commands: apply, diff, delete, check; usage: "
-            "hullctl scene COMMAND [FILE] [OPTIONS]");
+            "hullctl scene [COMMAND] [FILE] [OPTIONS]");
   EXPECT_EQ(error({"check", "a", "b", "--verfy"}),
             "hullctl: 'hullctl check' has no option \"--verfy\"; did you mean \"--verify\"?");
   EXPECT_EQ(error({"list", "--servr=x:1"}),
@@ -185,6 +185,12 @@ TEST_F(HullctlTest, HelpGroupsCommandsByTaskAndEachHasExamples) {
       EXPECT_LE(line.size(), 100U) << command << ": " << line;
     }
   }
+}
+
+TEST_F(HullctlTest, TheUsageOfCoverEndsWithItsFile) {
+  const std::string help = RunTool({"cover", "--help"}).out;
+  EXPECT_THAT(help, HasSubstr("Usage: hullctl cover ID... FILE [OPTIONS]\n"));
+  EXPECT_THAT(help, HasSubstr("\n  ID... FILE  IDs of hulls or bodies, then the mesh"));
 }
 
 TEST_F(HullctlTest, HelpAndVersionExitWithZero) {

@@ -70,9 +70,7 @@ TEST_F(InvalidModel, IsRefusedByItsReader) {
     EXPECT_EQ(read.status.code(), absl::StatusCode::kInvalidArgument) << path;
     EXPECT_THAT(read.error(), HasSubstr(path.string()));
     const auto mesh = ReadMesh(path.string());
-    if (path.filename() != "empty.obj") {
-      EXPECT_FALSE(mesh.ok()) << path;
-    }
+    EXPECT_TRUE(!mesh.ok() || mesh->triangles.empty()) << path;
     ++known;
   }
   EXPECT_GE(known, 15);

@@ -66,6 +66,11 @@ def test_what_are_no_numbers_is_refused() -> None:
             hulld.as_points(bad)
 
 
+def test_the_name_of_a_file_is_refused_with_advice() -> None:
+    with pytest.raises(TypeError, match="points is 'part.stl'; read the file first"):
+        hulld.as_points("part.stl")
+
+
 def test_meshes_and_clouds_of_other_libraries_are_points(either: Any, name: str) -> None:
     class Buffer:
         """As the vectors of Open3D: an array only for numpy."""

@@ -296,6 +296,8 @@ FileVerdict CheckFile(FileKind kind, std::string_view content) {
       return CheckMesh(ReadObjMesh, content);
     case FileKind::kOffMesh:
       return CheckMesh(ReadOffMesh, content);
+    case FileKind::kPlyMesh:
+      return CheckMesh(ReadPlyMesh, content);
     case FileKind::kStlMesh:
       return CheckMesh(MeshOfParts<ReadStlParts>, content);
     case FileKind::kGltfMesh:
@@ -469,6 +471,15 @@ std::vector<SeedFile> SeedFiles() {
       {FileKind::kDaeMesh, SmallDae()},
       {FileKind::kObjMesh, "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1/1 2//2 -1/3/3 4\n"},
       {FileKind::kOffMesh, "OFF 3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2 255 0 0\n"},
+      {FileKind::kPlyMesh,
+       "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+       "property float z\nelement face 1\nproperty list uchar int vertex_indices\n"
+       "element tristrips 1\nproperty list int int vertex_index\nend_header\n0 0 0\n1 0 0\n"
+       "0 1 0\n3 0 1 2\n5 2 1 0 -1 0\n"},
+      {FileKind::kPlyMesh,
+       "ply\nformat binary_big_endian 1.0\nelement vertex 1\nproperty char x\nproperty char y\n"
+       "property char z\nelement face 2\nproperty list char short vertex_index\nend_header\n" +
+           std::string("\1\2\3\3\0\0\0\0\0\0\0", 11)},
       {FileKind::kBatch,
        "# c\nplace: {a: {id: arm}, b: {id: box, at: [1, 0, 0, 0, 1, 2, 3]}}\n"
        "ask: {pairs: [[a, b]]} # d\n"},

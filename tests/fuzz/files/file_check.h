@@ -24,6 +24,7 @@ enum class FileKind {
   kDae,
   kObjMesh,
   kOffMesh,
+  kPlyMesh,
   kStlMesh,
   kGltfMesh,
   kDaeMesh,

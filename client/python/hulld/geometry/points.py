@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from typing import Any, Protocol, Union
 
@@ -45,8 +46,13 @@ def as_points(points: PointsLike, name: str = "points") -> Points:
 
     ValueError: a different shape; a coordinate that is masked or not finite (the message names it);
     numbers that are not exactly doubles, such as some integers beyond 2^53 or long doubles.
-    TypeError: not numbers, such as booleans or complex numbers.
+    TypeError: not numbers, such as booleans, complex numbers, or the name of a file.
     """
+    if isinstance(points, (str, os.PathLike)):
+        raise TypeError(
+            f"{name} is {str(points)!r}; read the file first, as with np.loadtxt or trimesh.load, or "
+            "append it with hullctl append"
+        )
     if not isinstance(points, np.ndarray):
         points = getattr(points, "vertices", getattr(points, "points", points))
     array = as_array(points, name)

@@ -54,7 +54,7 @@ TEST_F(CompletionOnServer, IdsOfHullsComeFromTheServer) {
   Create("arm/2");
   Create("box");
   EXPECT_THAT(Offers({"get", ""}), ElementsAre("arm/1", "arm/2", "box", ":"));
-  EXPECT_THAT(Offers({"check", "box", "arm"}), ElementsAre("arm/1", "arm/2", ":"));
+  EXPECT_THAT(Offers({"check", "box", "arm"}), ElementsAre("arm/1", "arm/2", ":files"));
   EXPECT_THAT(Offers({"delete", "box", "b"}), ElementsAre("box", ":"));
   EXPECT_THAT(Offers({"create", ""}), ElementsAre(":"));
   // Many IDs are completed by segments.
@@ -67,8 +67,8 @@ TEST_F(CompletionOnServer, IdsOfHullsComeFromTheServer) {
 TEST_F(CompletionOnServer, BodiesAreOfferedWhereTheyAreAccepted) {
   Create("bolt");
   ASSERT_EQ(RunTool({"body", "put", "bracket", "bolt", "--server", server_->address()}).code, 0);
-  EXPECT_THAT(Offers({"check", "b"}), ElementsAre("bolt", "bracket", ":"));
-  EXPECT_THAT(Offers({"view", "b"}), ElementsAre("bolt", "bracket", ":"));
+  EXPECT_THAT(Offers({"check", "b"}), ElementsAre("bolt", "bracket", ":files"));
+  EXPECT_THAT(Offers({"view", "b"}), ElementsAre("bolt", "bracket", ":files"));
   EXPECT_THAT(Offers({"body", "get", ""}), ElementsAre("bracket", ":"));
   EXPECT_THAT(Offers({"get", "b"}), ElementsAre("bolt", ":"));
 }

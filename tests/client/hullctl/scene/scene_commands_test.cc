@@ -131,7 +131,9 @@ TEST_F(HullctlScene, PlacementsMoveAndTheFirstContactIsFound) {
   EXPECT_EQ(ran.out, "a\tb\tOVERLAPPING\tcontact at 0.5\n# touching 0 overlapping 1 failed 0\n");
   ran = Ask({"scene", "check", cell_.path(), "--first"});
   EXPECT_EQ(ran.code, 1);
-  EXPECT_THAT(ran.err, HasSubstr("no placement has an end_pose"));
+  EXPECT_THAT(
+      ran.err,
+      HasSubstr("--first orders pairs by their first contact, but no placement has a \"to\""));
   const TempFile pairs("pairs.yaml",
                        "place: {a: {id: cube}, b: {id: cube, to: [1, 0, 0]}}\n"
                        "ask: {pairs: [[a, b]]}\n");
@@ -139,6 +141,45 @@ TEST_F(HullctlScene, PlacementsMoveAndTheFirstContactIsFound) {
     ran = Ask({"scene", "check", pairs.path(), option});
     EXPECT_EQ(ran.code, 2);
     EXPECT_THAT(ran.err, HasSubstr(std::string(option) + " finds pairs itself"));
+  }
+}
+
+// Conflicts named fields of the contract, wanted.separation and end_pose.
+TEST_F(HullctlScene, ConflictsNameTheKeysOfTheFile) {
+  Put("cube", server::Cube());
+  const std::string place =
+      "place: {a: {id: cube}, b: {id: cube, at: [3, 0, 0], to: [2, 0, 0]}}\nask: {";
+  const TempFile all("all.yaml", place + "separation: true}\n");
+  const TempFile pairs("pairs.yaml", place + "separation: true, pairs: [[a, b]]}\n");
+  const std::string conflict = "ask.separation cannot be combined with \"to\"; query the first";
+  const std::string motion = "does not support motions; use 'hullctl batch' or 'hullctl scene'\n";
+  const std::pair<std::vector<std::string>, std::string> cases[] = {
+      {{"scene", "check", all.path()}, conflict},
+      {{"scene", "check", pairs.path()}, conflict},
+      {{"batch", all.path()}, conflict},
+      {{"stream", all.path()}, "placement b has a \"to\", but a stream " + motion},
+      {{"watch", "--scene", all.path()}, "placement b has a \"to\", but a watch " + motion}};
+  for (const auto& [command, text] : cases) {
+    const Ran ran = Ask(command);
+    EXPECT_NE(ran.code, 0);
+    EXPECT_THAT(ran.out + ran.err, HasSubstr(text)) << command[0];
+  }
+}
+
+TEST_F(HullctlScene, CheckBeforeApplyNamesTheHullAndTheRemedy) {
+  const std::string text = "hull \"cell/table\" not found; 'hullctl scene apply' creates it\n";
+  Ran ran = Ask({"scene", "check", cell_.path()});
+  EXPECT_THAT(ran.err, HasSubstr("hullctl: placement b: " + text));
+  ran = Ask({"watch", "--scene", cell_.path(), "--until-synced"});
+  EXPECT_THAT(ran.err, HasSubstr("hullctl: placement b: " + text));
+  const TempFile pairs("pairs.yaml",
+                       "hulls: {h: {box: [1, 1, 1]}}\nplace: {a: {hull: h}, b: {id: other}}\n"
+                       "ask: {pairs: [[a, b], [b, b]]}\n");
+  for (const char* command : {"batch", "stream"}) {
+    ran = Ask({command, pairs.path()});
+    EXPECT_THAT(ran.out,
+                HasSubstr("FAILED\thull \"h\" not found; 'hullctl scene apply' creates it\n"));
+    EXPECT_THAT(ran.out, HasSubstr("FAILED\thull \"other\" not found\n"));
   }
 }
 

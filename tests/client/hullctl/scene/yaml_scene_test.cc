@@ -227,6 +227,8 @@ TEST(YamlScene, ErrorsNameLineColumnAndKey) {
     EXPECT_THAT(ErrorOf(text), HasSubstr(error)) << text;
   }
   EXPECT_THAT(ErrorOf(std::string(100000, '[')), HasSubstr("not valid YAML"));
+  EXPECT_THAT(ErrorOf("place:\n  a: {id: x}\n\tb: {id: x}\n"),
+              HasSubstr("; line 3 starts with a tab; indent with spaces"));
 }
 
 TEST(YamlScene, IsReadByReadScene) {

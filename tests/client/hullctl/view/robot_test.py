@@ -85,6 +85,8 @@ class RobotTest(viewer_case.ViewerCase):
         self.hulld.hullctl("view", "arm.urdf", "--joints", "path.csv", "--html", str(target))
         self.browser.driver.get(target.as_uri())
         self.browser.wait("document.body.dataset.fitted")
+        self.assertIn("To move the joints, run hullctl view without --html.",
+                      self.browser.text("#joints"))
         self.browser.js("hulldViewer.model.select(2, 0)")
         for waypoint, relation in enumerate(["separated", "separated", "touching", "overlapping"]):
             self.slide("#moment", waypoint)

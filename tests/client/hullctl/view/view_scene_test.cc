@@ -47,7 +47,25 @@ TEST(ViewScene, ScenesAreRecognizedByTheirExtensionOrTheirFirstLine) {
   EXPECT_FALSE(IsSceneFile(TempFile("points.xyz", "nan 2 3\n").path()));
   EXPECT_FALSE(IsSceneFile(TempFile("empty.txt", "").path()));
   EXPECT_FALSE(IsSceneFile(TempFile("points.csv", "x:1,y,z\n1,2,3\n").path()));
+  EXPECT_FALSE(IsSceneFile(TempFile("points.txt", "Points:0,Points:1,Points:2\n1,2,3\n").path()));
   EXPECT_FALSE(IsSceneFile("/no/such/file.txt"));
+}
+
+TEST(ViewScene, PlyFilesAreMeshesOrClouds) {
+  const std::string head =
+      "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
+      "property float z\nelement face ";
+  const std::string rest = "\nproperty list uchar int vertex_indices\nend_header\n";
+  const auto mesh = ReadShape(
+      TempFile("a.ply", head + "1" + rest + "0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 1 2\n").path());
+  ASSERT_TRUE(mesh.ok()) << mesh.status();
+  EXPECT_EQ(mesh->point_count, 4u);
+  EXPECT_THAT(mesh->triangles, ElementsAre(0, 1, 2));
+  const auto cloud =
+      ReadShape(TempFile("a.ply", head + "0" + rest + "0 0 0\n1 0 0\n0 1 0\nnan 0 1\n").path());
+  ASSERT_TRUE(cloud.ok()) << cloud.status();
+  EXPECT_EQ(cloud->point_count, 3u);
+  EXPECT_TRUE(cloud->triangles.empty());
 }
 
 TEST(ViewScene, ABodyOfASceneIsOneObject) {

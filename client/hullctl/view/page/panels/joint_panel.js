@@ -1,6 +1,9 @@
 // Sliders for the joints of a robot.
 import {element, short} from 'hulld/panels/dom.js';
 
+// Poses of other joint values need hullctl.
+const RECORDED = 'Recorded. To move the joints, run hullctl view without --html.';
+
 export class JointPanel {
   // move(values, rest): moves the joints; rest: the slider was released.
   constructor(model, live, move) {
@@ -13,9 +16,9 @@ export class JointPanel {
   // Called when the scene changes.
   rebuild() {
     this.sliders = this.model.joints.map((joint) => this.slider(joint));
-    const title = element('h2', {}, 'Joints');
-    this.root.replaceChildren(
-        ...(this.sliders.length ? [title, ...this.sliders.map(({block}) => block)] : []));
+    const parts = [element('h2', {}, 'Joints'), ...this.sliders.map(({block}) => block)];
+    if (!this.live) parts.push(element('p', {className: 'quiet'}, RECORDED));
+    this.root.replaceChildren(...(this.sliders.length ? parts : []));
   }
 
   slider(joint) {
