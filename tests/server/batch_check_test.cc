@@ -137,7 +137,7 @@ TEST(BatchCheck, RefusesStatesOfOtherRevisions) {
   batch.others.front() = SeenAt("a", 2);
   EXPECT_EQ(FaultOf({batch}), "");
   batch.others.back().at_least_revision = 3;
-  EXPECT_THAT(FaultOf({batch}), HasSubstr("of the store of c to one who wants at least 3"));
+  EXPECT_THAT(FaultOf({batch}), HasSubstr("of the store of c, requested with at least revision 3"));
   batch.others.back() = SeenAt("c", 2);
   batch.others.back().store_revision = 1;
   EXPECT_THAT(FaultOf({batch}), HasSubstr("revision 1 of the store of c contains a later one"));

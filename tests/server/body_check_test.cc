@@ -181,7 +181,7 @@ TEST(BodyCheck, ARequestedRevisionIsSeen) {
   };
   EXPECT_EQ(fault_of(version), "");
   version.at_least_revision = 2;
-  EXPECT_THAT(fault_of(version), HasSubstr("to one who wants at least 2"));
+  EXPECT_THAT(fault_of(version), HasSubstr("requested with at least revision 2"));
   // The answer names a revision whose changes it lacks.
   version.store_revision = 2;
   EXPECT_NE(fault_of(version), "");
@@ -190,7 +190,7 @@ TEST(BodyCheck, ARequestedRevisionIsSeen) {
   Operation ask = AskAt(100, 101, 10, 2, 2, false);
   EXPECT_EQ(FaultOf({ask}), "");
   ask.others.back().at_least_revision = 3;
-  EXPECT_THAT(FaultOf({ask}), HasSubstr("of the store of c to one who wants at least 3"));
+  EXPECT_THAT(FaultOf({ask}), HasSubstr("of the store of c, requested with at least revision 3"));
 }
 
 // Changes of one store take effect in revision order.

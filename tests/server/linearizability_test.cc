@@ -375,7 +375,7 @@ TEST(FreshnessCheck, ARequestedRevisionIsSeen) {
   probe.at_least_revision = 1;
   EXPECT_EQ(FaultOf(probe), "");
   probe.at_least_revision = 2;
-  EXPECT_THAT(FaultOf(probe), HasSubstr("to one who wants at least 2"));
+  EXPECT_THAT(FaultOf(probe), HasSubstr("requested with at least revision 2"));
   // A hull created by that time cannot be missing.
   probe.outcome = Outcome::kNotFound;
   probe.store_revision = 0;
