@@ -14,6 +14,7 @@
 #include "client/packed_placements.h"
 #include "client/verify/answer_check.h"
 #include "server/store/records.h"
+#include "server/store/store_keys.h"
 #include "tests/server/collisions/watch_round.h"
 #include "tests/server/harness/test_server.h"
 
