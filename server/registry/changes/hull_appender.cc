@@ -89,18 +89,22 @@ void LocalChanges::OpenAppend(const std::string& id, const std::string& writer_i
                               Reply<OpenResult> done, ClientId client) {
   const auto request = std::make_shared<OpenRequest>(
       OpenRequest{id, writer_id, create_if_absent, std::move(on_gone), std::move(done), client});
-  records_.WhenReady(id, RecordReader::For::kLife, request->done,
-                     [=, this](Locked& locked, const LockedTask& again) {
-                       const HullPointer hull = state_.Find(request->hull_id);
-                       if (hull == nullptr) return OpenNew(locked, request, again);
-                       // May query the store.
-                       writers_.Submit(
-                           [=, this] {
-                             Locked later(state_.mutex);
-                             OpenExisting(later, hull, request, again);
-                           },
-                           request->client);
-                     });
+  const auto open = [=, this](Locked& locked, const LockedTask& again) {
+    const HullPointer hull = state_.Find(request->hull_id);
+    if (hull == nullptr) return OpenNew(locked, request, again);
+    // May query the store.
+    writers_.Submit(
+        [=, this] {
+          Locked later(state_.mutex);
+          OpenExisting(later, hull, request, again);
+        },
+        request->client);
+  };
+  writers_.Submit(
+      [=, this] {
+        records_.WhenReady(request->hull_id, RecordReader::For::kLife, request->done, open);
+      },
+      client);
 }
 
 // The session opens in the completion of the creation, because the hull may be gone immediately
