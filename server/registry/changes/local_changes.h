@@ -87,10 +87,11 @@ class LocalChanges : public PeerChangeListener {
   // RESOURCE_EXHAUSTED: --max-hulls, or the disk is full; UNAVAILABLE: as above.
   void Replace(Replacement replacement, const Reply<PutHullResult>& done);
 
-  // Opens a session; `done` runs on this or another thread. `on_gone` is called at most once, on
-  // any thread, with the reason if the hull is deleted or replaced before the session is closed.
-  // NOT_FOUND; with create_if_absent as Create; DATA_LOSS: the store is damaged;
-  // RESOURCE_EXHAUSTED: --max-writers-per-hull. client: shares threads fairly with other clients.
+  // Opens a session; `done` runs on another thread, because the caller may hold a lock that it
+  // acquires. `on_gone` is called at most once, on any thread, with the reason if the hull is
+  // deleted or replaced before the session is closed. NOT_FOUND; with create_if_absent as Create;
+  // DATA_LOSS: the store is damaged; RESOURCE_EXHAUSTED: --max-writers-per-hull. client: shares
+  // threads fairly with other clients.
   void OpenAppend(const std::string& id, const std::string& writer_id, bool create_if_absent,
                   std::function<void(const absl::Status&)> on_gone, Reply<OpenResult> done,
                   ClientId client = kNoClient);

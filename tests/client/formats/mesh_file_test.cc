@@ -158,7 +158,7 @@ TEST(MeshFile, PlyCloudsHaveNoTriangles) {
   ASSERT_TRUE(mesh.ok()) << mesh.status();
   EXPECT_TRUE(mesh->vertices.empty());
   EXPECT_THAT(ReadParts(file.path(), SplitBy::kName).status().ToString(),
-              HasSubstr("a.ply: it contains no triangle"));
+              HasSubstr("a.ply: contains no triangles"));
 }
 
 TEST(MeshFile, FormatsWithoutFacesAreRefusedWithAdvice) {
