@@ -94,13 +94,13 @@ class Client {
                           std::optional<std::chrono::milliseconds> timeout = {}) const;
 
   absl::StatusOr<v1::GetHullResponse> GetHull(const std::string& hull_id, bool audit = false) const;
-  // The same, with all options of the request, such as properties.
+  // Accepts all options of the request, such as properties.
   absl::StatusOr<v1::GetHullResponse> GetHull(const v1::GetHullRequest& request) const;
 
   // INTERNAL: the stream is inconsistent.
   absl::StatusOr<HullMesh> GetHullMesh(const std::string& hull_id) const;
-  // The same, with all options of the request, such as a simplification. `on_part`, if set,
-  // receives the mesh so far after each part, header first; a retried call starts over.
+  // Accepts all options of the request, such as a simplification. Calls `on_part`, if set, after
+  // each part, with the mesh received so far; the header comes first. A retried call starts over.
   absl::StatusOr<HullMesh> GetHullMesh(
       const v1::GetHullMeshRequest& request,
       const std::function<void(const HullMesh&)>& on_part = {}) const;

@@ -70,10 +70,9 @@ class Guard {
   // Null: calls need no token.
   std::atomic<std::shared_ptr<const TokenTable>> tokens_;
 
+  // Held while files are read; guards the members below.
   std::mutex mutex_;
-  // Held while files are read. Guards the members below.
-  //
-  // Identity in force, and the last logged error of each kind of file.
+  // The current TLS identity, and the last logged error of each kind of file.
   TlsIdentity identity_;
   std::string tls_complaint_;
   std::string tokens_complaint_;

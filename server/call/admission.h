@@ -76,7 +76,7 @@ class Admission {
     using Clients = std::unordered_map<std::string, Client>;
     // A call to end when its token is revoked or when it is overdue.
     struct Watched {
-      // As in Arrival.
+      // The owner of the token; without a token, Caller().
       Caller caller;
       CallLifetime* lifetime;
       std::function<void()> on_revoked;

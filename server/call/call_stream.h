@@ -19,9 +19,9 @@
 namespace hulld::server {
 
 // Base class of streaming calls. A call owns itself until gRPC releases it. It is admitted before
-// it does anything else, and finishes exactly once. Reactor: a reactor from message_bytes.h.
-//
-// Derived classes: PulledStream creates replies one at a time; QueuedStream queues them.
+// it does anything else, and finishes exactly once. `Reactor` is one of the reactors in
+// message_bytes.h. Of the two derived classes, PulledStream creates replies one at a time, and
+// QueuedStream queues them.
 template <typename Reactor>
 class CallStream : public Reactor, public std::enable_shared_from_this<CallStream<Reactor>> {
  public:

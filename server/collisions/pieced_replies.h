@@ -355,7 +355,7 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     for (const std::unique_ptr<Work>& piece : pieces_) {
       if (piece->is_running || piece->is_done()) continue;
       const bool is_front = piece == pieces_.front();
-      // A textbook pair holds memory once started, so only one is started at a time.
+      // Textbook pairs keep memory between slices, so only the first piece runs.
       if (!is_front && (piece->bytes >= kMaxHeldBytes || IsTextbook())) continue;
       piece->is_running = true;
       ++running_;

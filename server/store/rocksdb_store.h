@@ -150,9 +150,10 @@ class RocksDbStore : public Store {
   void Compact(std::span<Change* const> changes);
   // Counts a failed sync if a sync failed since the last count, otherwise a failed write.
   void CountWriteFailure();
-  // Counts the failure, and returns its error for the client.
+  // Counts the failure of a write, and returns its error for the client.
   absl::Status WriteFailed(const rocksdb::Status& status);
-  // As above, for a read. DATA_LOSS: the value is damaged; not counted as a failure of the disk.
+  // Counts the failure of a read, and returns its error for the client. DATA_LOSS: the value is
+  // damaged, which does not count as a failure of the disk.
   absl::Status ReadFailed(const rocksdb::Status& status);
   absl::Status ReadMeta();
   absl::Status InitializeMeta();

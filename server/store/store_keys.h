@@ -86,8 +86,8 @@ absl::StatusOr<uint64_t> DecodeNumber(std::string_view value);
 // Encodes all fields but the ID, which is the key.
 std::string EncodeStoredHull(const StoredHull& hull);
 absl::StatusOr<StoredHull> DecodeStoredHull(std::string_view hull_id, std::string_view value);
-// As above, as binary numbers and texts with their lengths. Radii follow at the end unless all are
-// 0.
+// Encodes all fields but the ID, as binary numbers and length-prefixed strings. The radii of the
+// pieces follow unless all are 0.
 std::string EncodeStoredBody(const StoredBody& body);
 absl::StatusOr<StoredBody> DecodeStoredBody(std::string_view body_id, std::string_view value);
 std::string EncodeVertices(std::span<const Vector> vertices);

@@ -15,9 +15,6 @@ using LaneIds = int64_t __attribute__((vector_size(32)));
 [[gnu::always_inline]] inline void Load(const double* from, Lanes& lanes) {
   std::memcpy(&lanes, from, sizeof lanes);
 }
-[[gnu::always_inline]] inline void Store(const Lanes& lanes, double* to) {
-  std::memcpy(to, &lanes, sizeof lanes);
-}
 [[gnu::always_inline]] inline void Broadcast(double value, Lanes& lanes) {
   lanes = Lanes{value, value, value, value};
 }

@@ -16,12 +16,13 @@
 
 namespace hulld {
 
-// The corners of the part of A - B that is nearest to the origin so far: a vertex, an edge, or a
-// triangle. The newest comes last.
+// Up to three vertices of A - B, called corners: a vertex, an edge, or a triangle, the part of a
+// simplex that is nearest to the origin; or four that surround it. The newest corner comes last.
 //
-// A new corner p makes a simplex with the others. Its nearest part contains p, because p was
-// farther toward the origin, and is one of seven: p, three edges, three faces. All are compared at
-// once, in the lanes of vector registers and without a branch, because the case is unpredictable.
+// Add() forms a simplex from these corners and a new one, p, and reduces it to its part nearest to
+// the origin. That part contains p, because p is farther toward the origin than the other corners,
+// so it is one of seven: p, three edges, or three faces. All seven are tested together, in the
+// lanes of vector registers and without branches, because the outcome is unpredictable.
 class Simplex {
  public:
   uint32_t count() const { return count_; }

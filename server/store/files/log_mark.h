@@ -50,11 +50,9 @@ absl::StatusOr<std::optional<LostLog>> FindLostLog(rocksdb::FileSystem& files,
                                                    const std::string& directory,
                                                    const LogMark& mark);
 
-// The file of the mark has two slots of one sector each that are overwritten in turn, so that one
-// is intact after a power failure, and a full disk does not prevent writing.
-//
-// Reads the mark; none if the file does not exist. DATA_LOSS: the file contains no mark.
-// UNAVAILABLE: it cannot be read.
+// Reads the mark; nullopt if the file does not exist. DATA_LOSS: the file contains no intact mark.
+// UNAVAILABLE: it cannot be read. The file has two slots of one sector each, overwritten in turn:
+// one is intact after a power failure, and a full disk does not prevent writing.
 absl::StatusOr<std::optional<LogMark>> ReadLogMark(rocksdb::FileSystem& files,
                                                    const std::string& path);
 // Creates the file durably, or replaces it.
