@@ -262,12 +262,12 @@ function lengths(question,   s, p, n, m, key) {
 
 function motion(   s, r, at) {
   read_rows("query_motion_" machine)
-  head("| vertices | close, warm | cold | gap, warm | cold | deep, warm | cold |")
-  split("sphere:8,sphere:64,sphere:512,sphere:10000,ur5", sets, ",")
-  split("close,gap,deep", regimes, ",")
-  for (s = 1; s <= 5; s++) {
+  head("| vertices | close, warm | cold | gap, warm | cold | deep, warm | cold | touching, warm | cold |")
+  split("sphere:8,sphere:64,sphere:512,sphere:10000,ur5,mating:8,mating:64", sets, ",")
+  split("close,gap,deep,contact", regimes, ",")
+  for (s = 1; s <= 7; s++) {
     printf "| %s |", set_name(sets[s])
-    for (r = 1; r <= 3; r++) {
+    for (r = 1; r <= 4; r++) {
       at = sets[s] " " regimes[r]
       printf " %s | %s |", short(cell[at " warm" SUBSEP "hulld", "ns"]), short(cell[at " cold" SUBSEP "hulld", "ns"])
     }
