@@ -16,6 +16,7 @@
 #include "core/query/exact/exact_pair.h"
 #include "core/query/floating/float_distance.h"
 #include "core/query/floating/float_pair.h"
+#include "core/query/floating/float_search.h"
 #include "core/query/ladder.h"
 #include "core/query/rounded.h"
 #include "core/query/separation.h"
@@ -120,12 +121,7 @@ SeparationRequest RequestOf(const QueryOptions& options) {
           options.max_error,       options.clearance,    options.max_depth_bytes};
 }
 
-Purpose PurposeOf(const QueryOptions& options) {
-  return SearchEndFor(RequestOf(options)) == SearchEnd::kNearest ? Purpose::kSeparation
-                                                                 : Purpose::kEvidence;
-}
-
-// Adds the requested details of the separation. `decision`: of the cores, by PurposeOf.
+// Adds the requested details of the separation. `decision`: of the cores.
 absl::Status AddSeparation(const FloatPair& pair, const Decision& decision, bool cold,
                            const QueryOptions& options, Answer& answer) {
   if (!WantsSeparation(options)) return absl::OkStatus();
@@ -176,8 +172,8 @@ absl::StatusOr<Answer> CertifiedSearch(const PlacedHull& a, const PlacedHull& b,
                                        const QueryOptions& options, PairCache* cache) {
   const FloatPair pair(a, b);
   Decision decision;
-  if (absl::Status s =
-          Decide(pair, options.tolerance, cache, PurposeOf(options), options.should_stop, decision);
+  if (absl::Status s = Decide(pair, options.tolerance, cache, Purpose::kEvidence,
+                              SearchErrorFor(RequestOf(options)), options.should_stop, decision);
       !s.ok()) {
     return s;
   }
@@ -241,7 +237,8 @@ absl::StatusOr<Answer> SearchRounded(const PlacedHull& a, const PlacedHull& b,
   }
   if (!WantsSeparation(options)) return answer;
   Decision of_cores;
-  absl::Status s = Decide(pair, 0, nullptr, PurposeOf(options), options.should_stop, of_cores);
+  absl::Status s = Decide(pair, 0, nullptr, Purpose::kEvidence, SearchErrorFor(RequestOf(options)),
+                          options.should_stop, of_cores);
   if (s.ok()) s = AddSeparation(pair, of_cores, /*cold=*/true, options, answer);
   if (!s.ok()) return s;
   return answer;
@@ -263,7 +260,7 @@ absl::StatusOr<Answer> RelationOnly(const PlacedHull& a, const PlacedHull& b,
   Decision decision;
   const absl::Status decided =
       Decide(FloatPair(swapped ? b : a, swapped ? a : b), options.tolerance, cache,
-             Purpose::kRelation, options.should_stop, decision);
+             Purpose::kRelation, kEndsAtSign, options.should_stop, decision);
   if (swapped && cache != nullptr) Mirror(*cache);
   // Every return statement names this variable, so that the compiler constructs it in the caller's
   // storage.

@@ -150,7 +150,8 @@ void Remember(const FloatSearchResult& found, PairCache& cache) {
 // pairs short.
 [[gnu::noinline]] bool DecideInFloatingPoint(const FloatPair& pair, const PlainVector& n,
                                              double tolerance, PairCache* cache, Purpose purpose,
-                                             FloatSearchResult& found, Decision& decision) {
+                                             double max_error, FloatSearchResult& found,
+                                             Decision& decision) {
   if (cache != nullptr) {
     // A tolerance or requested evidence needs more than the relation.
     const bool relation_alone = tolerance == 0 && purpose == Purpose::kRelation;
@@ -179,8 +180,7 @@ void Remember(const FloatSearchResult& found, PairCache& cache) {
       return true;
     }
   }
-  const SearchEnd end = purpose == Purpose::kSeparation ? SearchEnd::kNearest : SearchEnd::kSign;
-  found = SearchInFloatingPoint(pair, tolerance, first, end);
+  found = SearchInFloatingPoint(pair, tolerance, first, max_error);
   decision.directions_tried += found.directions_tried;
   if (cache != nullptr) Remember(found, *cache);
   if (found.verdict == FloatVerdict::kUndecided) return false;
@@ -218,7 +218,8 @@ void Remember(const FloatSearchResult& found, PairCache& cache) {
 }  // namespace
 
 absl::Status Decide(const FloatPair& pair, double tolerance, PairCache* cache, Purpose purpose,
-                    const std::function<bool()>& should_stop, Decision& decision) {
+                    double max_error, const std::function<bool()>& should_stop,
+                    Decision& decision) {
   HULLD_DCHECK(tolerance >= 0);
   if (pair.usable()) {
     const PlainVector n = -pair.CenterDifference();
@@ -227,7 +228,7 @@ absl::Status Decide(const FloatPair& pair, double tolerance, PairCache* cache, P
       return absl::OkStatus();
     }
     FloatSearchResult found;
-    if (DecideInFloatingPoint(pair, n, tolerance, cache, purpose, found, decision)) {
+    if (DecideInFloatingPoint(pair, n, tolerance, cache, purpose, max_error, found, decision)) {
       return absl::OkStatus();
     }
     const absl::Status status = DecideExactly(pair, &found, purpose, should_stop, decision);

@@ -36,18 +36,17 @@ struct Decision {
 // The purpose of a decision.
 enum class Purpose {
   kRelation,
-  kEvidence,    // also the axis and the pairs that the search found
-  kSeparation,  // kEvidence, with a search until SearchEnd::kNearest
+  kEvidence,  // also the axis and the pairs that the search found
 };
 
 // Decides the relation by a ladder of rungs, each of which answers only if its own error bound
 // proves it: bounding spheres; the cache; for the relation alone, bounds of the hulls along the
 // line of their centers; the hulls in floating point; exact arithmetic. Fills `decision`, which
 // must be newly constructed. Requires: tolerance >= 0. Updates the cache, which may be null and
-// otherwise belongs to these two hulls. CANCELLED: should_stop, which may be empty, returned true;
-// only the exact rung polls it.
+// otherwise belongs to these two hulls. `max_error`: that of SearchInFloatingPoint. CANCELLED:
+// should_stop, which may be empty, returned true; only the exact rung polls it.
 absl::Status Decide(const FloatPair& pair, double tolerance, PairCache* cache, Purpose purpose,
-                    const std::function<bool()>& should_stop, Decision& decision);
+                    double max_error, const std::function<bool()>& should_stop, Decision& decision);
 
 }  // namespace hulld
 

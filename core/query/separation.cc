@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <span>
 #include <utility>
 #include <variant>
@@ -92,7 +93,7 @@ class SeparationSearch {
     if (core_ == Relation::kTouching) {
       SetStart(decision.pairs, decision.pair_count);
     } else if (pair.usable()) {
-      StartFrom(decision, cold, SearchEndFor(request));
+      StartFrom(decision, cold, SearchErrorFor(request));
     }
   }
 
@@ -195,14 +196,15 @@ class SeparationSearch {
   // Chooses the start of the floating-point search: the axis and pairs that the search of the
   // relation ended with, or four pairs with differences that surround the origin. The choice does
   // not depend on the suggestion of a cache.
-  void StartFrom(const Decision& decision, bool cold, SearchEnd end) {
+  void StartFrom(const Decision& decision, bool cold, double max_error) {
     toward_ = -pair_.CenterDifference();
     if (cold || decision.rung == Rung::kBounds) {
       if (const Vector* n = std::get_if<Vector>(&decision.axis)) toward_ = *n;
       SetStart(decision.pairs, decision.pair_count);
       return;
     }
-    const FloatSearchResult found = SearchInFloatingPoint(pair_, 0, -pair_.CenterDifference(), end);
+    const FloatSearchResult found =
+        SearchInFloatingPoint(pair_, 0, -pair_.CenterDifference(), max_error);
     if (found.verdict == FloatVerdict::kUndecided) return;
     if (found.verdict == FloatVerdict::kSeparated) toward_ = found.axis;
     SetStart(found.pairs, found.pair_count);

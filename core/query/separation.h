@@ -26,11 +26,10 @@ struct SeparationRequest {
   uint64_t max_depth_bytes = std::numeric_limits<uint64_t>::max();
 };
 
-// Returns the end of the search of the relation that suits the request.
-inline SearchEnd SearchEndFor(const SeparationRequest& request) {
-  // A loose goal is often met earlier.
-  const bool is_close = !request.max_error && (request.separation || request.witness);
-  return is_close ? SearchEnd::kNearest : SearchEnd::kSign;
+// Returns the `max_error` of SearchInFloatingPoint that suits the request.
+inline double SearchErrorFor(const SeparationRequest& request) {
+  if (!request.separation && !request.witness) return kEndsAtSign;
+  return request.max_error.value_or(0);
 }
 
 struct SeparationAnswer {
@@ -44,7 +43,7 @@ struct SeparationAnswer {
 // from exact arithmetic, rounded. The values depend on the pair alone, not on the path to the
 // relation. `decision`: of the cores. `relation`: of the rounded hulls; equals the decision's
 // relation if there are no radii. Requires: relations other than kWithinTolerance. `cold`: true if
-// no cache helped the decision and its search ended at SearchEndFor, so that its pairs may be used.
+// no cache helped the decision and its search had SearchErrorFor, so that its pairs may be used.
 // CANCELLED: should_stop, which may be empty, returned true. RESOURCE_EXHAUSTED: DepthTooLarge.
 absl::Status FindSeparation(const FloatPair& pair, const Decision& decision, Relation relation,
                             bool cold, const SeparationRequest& request,

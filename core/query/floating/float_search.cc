@@ -7,6 +7,7 @@
 #include "core/numeric/error_bounds.h"
 #include "core/numeric/exponent_limits.h"
 #include "core/numeric/simd_path.h"
+#include "core/query/floating/nearest_part.h"
 #include "core/query/floating/simplex.h"
 #include "core/query/floating/small_pair.h"
 #include "core/query/terms/separation_bounds.h"
@@ -53,8 +54,8 @@ template <typename SmallPair>
 template <typename Pair>
 class FloatSearch {
  public:
-  FloatSearch(const Pair& pair, double tolerance, SearchEnd end)
-      : pair_(pair), tolerance_(tolerance), end_(end) {}
+  FloatSearch(const Pair& pair, double tolerance, double max_error)
+      : pair_(pair), tolerance_(tolerance), max_error_(max_error) {}
 
   FloatSearchResult Run(const PlainVector& first) {
     LaneVector n(IsZero(first) ? PlainVector(1, 0, 0) : first);
@@ -84,10 +85,17 @@ class FloatSearch {
     if (farthest.value < -error) {
       result_.verdict = FloatVerdict::kSeparated;
       result_.axis = along_;
-      if (end_ == SearchEnd::kSign) return false;
+      if (max_error_ == kEndsAtSign) return false;
+    }
+    const bool is_first = simplex_.count() == 0;
+    if (result_.verdict == FloatVerdict::kSeparated && !is_first) {
+      // The direction leads across the corners, so this is the width of the bounds times its
+      // length.
+      const double ahead = farthest.value - Dot(along_, simplex_.corner(simplex_.count() - 1));
+      const double allowed = max_error_ > 0 ? 2 * max_error_ * Norm(along_) : 0;
+      if (!(ahead > error + allowed)) return false;
     }
     // Without progress, no vertex is farther toward the origin.
-    const bool is_first = simplex_.count() == 0;
     const bool progress = is_first || !simplex_.Contains(farthest.pair);
     bool outside = true;
     bool at_corner = false;
@@ -106,13 +114,9 @@ class FloatSearch {
     }
     if (result_.verdict == FloatVerdict::kSeparated) {
       // Separated, only a flat tetrahedron seems to hold the origin.
-      if (!outside) simplex_.ReduceToNearestFace();
-      // The vertex found before is a corner that the direction leads across.
-      const double ahead = farthest.value - Dot(along_, last_);
-      last_ = w.plain();
-      return progress && outside && (is_first || ahead > error);
+      if (!outside) n = LaneVector(TowardFromNearestFace());
+      return progress;
     }
-    last_ = w.plain();
     if (!outside) {
       if (HoldsOrigin(pair_, simplex_.corner(0), simplex_.corner(1), simplex_.corner(2),
                       simplex_.corner(3))) {
@@ -128,6 +132,13 @@ class FloatSearch {
       return false;
     }
     return progress && !at_corner;
+  }
+
+  // Reduces a flat tetrahedron. Returns the direction toward the origin. Not inlined, to keep the
+  // search short.
+  [[gnu::noinline]] PlainVector TowardFromNearestFace() {
+    simplex_.ReduceToNearestFace();
+    return NearestOnTriangle(simplex_.corner(0), simplex_.corner(1), simplex_.corner(2)).toward;
   }
 
   // Returns true if |separation| <= tolerance is certain: A - B has a point within the tolerance of
@@ -147,12 +158,10 @@ class FloatSearch {
 
   const Pair& pair_;
   const double tolerance_;
-  const SearchEnd end_;
+  const double max_error_;
   Simplex simplex_;
   // The last direction tried.
   PlainVector along_;
-  // The last vertex found.
-  PlainVector last_;
   // With a tolerance: true if A - B is known to reach no farther than the tolerance beyond the
   // origin along some direction.
   bool reach_is_short_ = false;
@@ -162,9 +171,9 @@ class FloatSearch {
 // Pair: a FloatPair or a SmallPair.
 template <typename Pair>
 FloatSearchResult SearchPortably(const FloatPair& pair, double tolerance, const PlainVector& first,
-                                 SearchEnd end) {
+                                 double max_error) {
   const Pair own(pair);
-  return FloatSearch(own, tolerance, end).Run(first);
+  return FloatSearch(own, tolerance, max_error).Run(first);
 }
 
 #ifdef HULLD_HAS_AVX2_PATH
@@ -173,33 +182,34 @@ template <typename Pair>
 __attribute__((target("avx2"), flatten)) FloatSearchResult SearchByAvx2(const FloatPair& pair,
                                                                         double tolerance,
                                                                         const PlainVector& first,
-                                                                        SearchEnd end) {
+                                                                        double max_error) {
   const Pair own(pair);
-  return FloatSearch(own, tolerance, end).Run(first);
+  return FloatSearch(own, tolerance, max_error).Run(first);
 }
 #else
 template <typename Pair>
 FloatSearchResult SearchByAvx2(const FloatPair& pair, double tolerance, const PlainVector& first,
-                               SearchEnd end) {
-  return SearchPortably<Pair>(pair, tolerance, first, end);
+                               double max_error) {
+  return SearchPortably<Pair>(pair, tolerance, first, max_error);
 }
 #endif
 
 template <typename Pair>
 FloatSearchResult Search(const FloatPair& pair, double tolerance, const PlainVector& first,
-                         SearchEnd end) {
-  return CurrentSimdPath() == SimdPath::kAvx2 ? SearchByAvx2<Pair>(pair, tolerance, first, end)
-                                              : SearchPortably<Pair>(pair, tolerance, first, end);
+                         double max_error) {
+  return CurrentSimdPath() == SimdPath::kAvx2
+             ? SearchByAvx2<Pair>(pair, tolerance, first, max_error)
+             : SearchPortably<Pair>(pair, tolerance, first, max_error);
 }
 
 }  // namespace
 
 FloatSearchResult SearchInFloatingPoint(const FloatPair& pair, double tolerance,
-                                        const PlainVector& first, SearchEnd end) {
+                                        const PlainVector& first, double max_error) {
   HULLD_DCHECK(pair.usable());
-  if (SmallPair<8>::Fits(pair)) return Search<SmallPair<8>>(pair, tolerance, first, end);
-  if (SmallPair<16>::Fits(pair)) return Search<SmallPair<16>>(pair, tolerance, first, end);
-  return Search<FloatPair>(pair, tolerance, first, end);
+  if (SmallPair<8>::Fits(pair)) return Search<SmallPair<8>>(pair, tolerance, first, max_error);
+  if (SmallPair<16>::Fits(pair)) return Search<SmallPair<16>>(pair, tolerance, first, max_error);
+  return Search<FloatPair>(pair, tolerance, first, max_error);
 }
 
 FloatSearchResult TryCached(const FloatPair& pair, const PairCache& cache) {

@@ -25,21 +25,18 @@ struct FloatSearchResult {
   uint64_t directions_tried = 0;
 };
 
-// The end of the search of a separated pair.
-enum class SearchEnd {
-  kSign,     // the first direction that shows the sign of the separation
-  kNearest,  // the point of A - B nearest to the origin, up to rounding, as a start for distances
-};
+inline constexpr double kEndsAtSign = -1;
 
 // Walks toward the point of A - B that is nearest to the origin (Gilbert, Johnson and Keerthi
-// 1988), until the sign of the separation shows, or until `end` if it is positive. The walk may
-// err; every claim is certified. SEPARATED: the support value is below -SupportError. OVERLAPPING:
-// the origin is inside a tetrahedron of vertices of A - B by more than the error of its volumes.
-// WITHIN_TOLERANCE: a point of A - B and a supporting plane of A - B are both within the tolerance
-// of the origin. `first`: the initial direction, for example from A's center to B's. Requires:
-// pair.usable().
+// 1988), until the sign of the separation shows. If it is positive and `max_error` is not
+// kEndsAtSign, the walk goes on, as a start for distances, until half the width of its bounds on
+// the separation is at most that, up to rounding. The walk may err; every claim is certified.
+// SEPARATED: the support value is below -SupportError. OVERLAPPING: the origin is inside a
+// tetrahedron of vertices of A - B by more than the error of its volumes. WITHIN_TOLERANCE: a point
+// of A - B and a supporting plane of A - B are both within the tolerance of the origin. `first`:
+// the initial direction, for example from A's center to B's. Requires: pair.usable().
 FloatSearchResult SearchInFloatingPoint(const FloatPair& pair, double tolerance,
-                                        const PlainVector& first, SearchEnd end = SearchEnd::kSign);
+                                        const PlainVector& first, double max_error = kEndsAtSign);
 
 // Proves the cached suggestion of an earlier query at the current poses; undecided if that fails.
 // Then, if hulls that touched may touch along the same axis, the result contains that axis and the

@@ -107,20 +107,10 @@ class Simplex {
     direction(nx, ex, p.x, n.x);
     direction(ny, ey, p.y, n.y);
     direction(nz, ez, p.z, n.z);
-    uint32_t one = answers & 127;
+    const uint32_t one = answers & 127;
     if (!std::has_single_bit(one)) [[unlikely]] {
-      // Rounding. Takes the first, or p.
-      one = one == 0 ? 1u << kAlone : one & -one;
-      const auto part = static_cast<uint32_t>(std::countr_zero(one));
-      const uint32_t lane = part % 3;
-      if (part == kAlone) {
-        n = LaneVector(-p.plain());
-      } else if (part < 3) {
-        const double turned = np[lane] > 0 ? -1 : 1;
-        n = LaneVector(turned * PlainVector(nx[lane], ny[lane], nz[lane]));
-      } else {
-        n = LaneVector(ep[lane] * PlainVector(ex[lane], ey[lane], ez[lane]) - ee[lane] * p.plain());
-      }
+      n = LaneVector(KeepNearest(p.plain(), pair));
+      return true;
     }
     Keep(static_cast<uint32_t>(std::countr_zero(one)), p, pair);
     return true;
@@ -201,6 +191,27 @@ class Simplex {
   // Moves the first three lanes cyclically: lane i becomes that of i + 1.
   [[gnu::always_inline]] static void Next(const Lanes& lanes, Lanes& next) {
     next = __builtin_shufflevector(lanes, lanes, 1, 2, 0, 3);
+  }
+  // Adds p as Add() does if rounding hides the nearest part, as in flat tetrahedra: compares all
+  // parts by their distances. Returns the direction. Not inlined, to keep the search short.
+  [[gnu::noinline]] PlainVector KeepNearest(const PlainVector& p, VertexPair pair) {
+    NearestPart nearest = NearestOfVertex(p);
+    uint32_t kept = kAlone;
+    for (uint32_t i = 0; i < 3; ++i) {
+      const uint32_t next = (i + 1) % 3;
+      if (pairs_[i] == kNone) continue;
+      const PlainVector q = {x_[i], y_[i], z_[i]};
+      const bool is_face = pairs_[next] != kNone;
+      const PlainVector r = is_face ? PlainVector(x_[next], y_[next], z_[next]) : q;
+      const NearestPart part = is_face ? NearestOnTriangle(p, q, r) : NearestOnEdge(p, q, 0, 1);
+      if (!(SquaredNorm(part.point) < SquaredNorm(nearest.point))) continue;
+      nearest = part;
+      // A part without p is as near as before; its face with p contains it.
+      const bool is_edge = part.count == 2 && part.corners[0] == 0;
+      kept = !is_face || (is_edge && part.corners[1] == 1) ? 3 + i : is_edge ? 3 + next : i;
+    }
+    Keep(kept, LaneVector(p), pair);
+    return nearest.toward;
   }
   // Keeps the corners of a part, with p.
   [[gnu::always_inline]] void Keep(uint32_t part, const LaneVector& p, VertexPair pair) {

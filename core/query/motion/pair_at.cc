@@ -1,6 +1,7 @@
 #include "core/query/motion/pair_at.h"
 
 #include "core/query/collision.h"
+#include "core/query/floating/float_search.h"
 #include "core/query/terms/pose.h"
 #include "core/query/terms/query_options.h"
 
@@ -44,7 +45,7 @@ PairAt::PairAt(const MovingHull& a, const MovingHull& b, double time) {
 absl::StatusOr<Decision> PairAt::DecideCores(const std::function<bool()>& should_stop) const {
   absl::StatusOr<Decision> decision(absl::in_place);
   const absl::Status status =
-      Decide(*pair_, 0, nullptr, Purpose::kEvidence, should_stop, *decision);
+      Decide(*pair_, 0, nullptr, Purpose::kEvidence, kEndsAtSign, should_stop, *decision);
   if (!status.ok()) decision = status;
   return decision;
 }

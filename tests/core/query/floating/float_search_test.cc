@@ -1,0 +1,55 @@
+#include "core/query/floating/float_search.h"
+
+#include <gtest/gtest.h>
+
+#include "core/query/collision.h"
+#include "core/query/floating/float_distance.h"
+#include "tests/core/checks/point_sets.h"
+
+namespace hulld::float_search_test {
+namespace {
+
+// Returns the distance of a triangle in A - B, in which the search of a separated pair ended.
+double DistanceAtEnd(const FloatPair& pair, const FloatSearchResult& found) {
+  const VertexPair pairs[] = {found.pairs[0], found.pairs[found.pair_count > 1 ? 1 : 0],
+                              found.pairs[found.pair_count - 1]};
+  return DistanceOfTriangle(pair, pairs);
+}
+
+// Half the width is the error, so the end of the search may be twice as far from the nearest point.
+TEST(FloatSearch, ASeparatedPairIsSearchedUntilTheErrorIsReached) {
+  Random random(20261127);
+  constexpr double kSize = 2;
+  constexpr double kErrors[] = {kEndsAtSign, kSize / 4, 1e-2, 1e-4, 0};
+  uint64_t directions[std::size(kErrors)] = {};
+  for (int round = 0; round < 400; ++round) {
+    const int vertices = round % 2 == 0 ? 8 : 100;
+    const Hull hull_a = BuildHull(RandomOnSphere(random, vertices, 1));
+    const Hull hull_b = BuildHull(RandomOnSphere(random, vertices, 1));
+    const QueryHull query_a(hull_a);
+    const QueryHull query_b(hull_b);
+    Pose X_WB;
+    X_WB.t = Vector(random.Real(1.5, 2), random.Real(-1, 1), random.Real(-1, 1));
+    const PlacedHull a = *PlacedHull::Make(query_a, Pose());
+    const PlacedHull b = *PlacedHull::Make(query_b, X_WB);
+    QueryOptions options;
+    options.want_separation = true;
+    const Answer answer = *CheckCollision(a, b, options);
+    if (answer.relation != Relation::kSeparated) continue;
+    const FloatPair pair(a, b);
+    for (size_t i = 0; i < std::size(kErrors); ++i) {
+      const FloatSearchResult found =
+          SearchInFloatingPoint(pair, 0, -pair.CenterDifference(), kErrors[i]);
+      ASSERT_EQ(found.verdict, FloatVerdict::kSeparated);
+      ASSERT_LE(found.pair_count, 3);
+      directions[i] += found.directions_tried;
+      if (kErrors[i] == kEndsAtSign) continue;
+      EXPECT_LE(DistanceAtEnd(pair, found), answer.separation->value + 2 * kErrors[i] + 1e-12)
+          << "round " << round << " error " << kErrors[i];
+    }
+  }
+  for (size_t i = 1; i < std::size(kErrors); ++i) EXPECT_GT(directions[i], directions[i - 1]) << i;
+}
+
+}  // namespace
+}  // namespace hulld::float_search_test
