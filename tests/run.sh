@@ -2,7 +2,7 @@
 # Builds hulld and tests it.
 #
 #   bash tests/run.sh            release build; every test except the long ones
-#   bash tests/run.sh --quick    core, query, and one call to a server, end to end
+#   bash tests/run.sh --quick    core without its proofs, and one query to a server, end to end
 #   bash tests/run.sh --ci       the checks of continuous integration: release and asan-ubsan with the
 #                                long tests, mutants, self-contained headers, clang-tidy over the
 #                                last change, and the Debian packages
@@ -122,10 +122,6 @@ finish() {
   return $code
 }
 
-build_and_test_packages() {
-  bash docker/debian/build.sh && bash tests/install/packages.sh build/release/packages
-}
-
 # One compiler process may use 1.5 GiB, so memory also limits the number of jobs.
 available_kib=$(awk '/^MemAvailable:/ { print $2 }' /proc/meminfo 2>/dev/null || true)
 jobs=$(nproc)
@@ -174,8 +170,8 @@ finish_packages() { [[ -z ${background[packages]-} ]] || run_part "more packages
 case $mode in
   quick)
     run_part "configure" cmake --preset release &&
-      run_part "build" build release "${core_targets[@]}" print_constants hulld smoke_client &&
-      run_part "tests" run_tests release -L '^(core|core-threads|digest-threads|smoke)$' -LE "^(slow|$rare)$"
+      run_part "build" build release "${core_targets[@]}" hulld smoke_client &&
+      run_part "tests" run_tests release -L '^(core|core-threads|digest-threads|smoke)$' -LE "^(slow|proof|$rare)$"
     ;;
   default)
     core_targets+=(print_constants proto_test)
@@ -194,9 +190,10 @@ case $mode in
     run_part "asan-ubsan: tests" finish asan-ubsan
     if [[ $release == built ]]; then
       in_background includes check_includes
+      in_background debian nice bash -c 'bash docker/debian/build.sh && bash tests/install/packages.sh build/release/packages'
       run_part "release: tests" test_rest release
       run_part "includes" finish includes
-      run_part "Debian packages" build_and_test_packages
+      run_part "Debian packages" finish debian
     fi
     run_part "tidy" bash tests/tidy.sh
     ;;

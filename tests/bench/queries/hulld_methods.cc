@@ -38,6 +38,7 @@ struct Hulld {
     relation_alone.tolerance = tolerance;
     with_separation.want_separation = true;
     with_separation.want_witness = true;
+    if (tolerance > 0) with_separation.max_error = tolerance;
   }
 
   QueryOptions relation_alone;

@@ -127,7 +127,7 @@ double BestSeparation(const Hull& a, const Pose& X_WA, const Hull& b, const Pose
 
 // Returns hulld itself.
 std::unique_ptr<QueryMethod> MakeHulld();
-// Returns hulld with QueryOptions::tolerance.
+// Returns hulld with a tolerance, which is also the max_error of depths and distances.
 std::unique_ptr<QueryMethod> MakeHulldWithin(double tolerance, std::string name);
 // Returns hulld, exact, on inner simplifications of the hulls with an error of at most max_error:
 // never reports a false collision.

@@ -204,8 +204,7 @@ Trade MeasureTrade(const TradeQuestions& questions, std::vector<TradeMethod>& me
                         {method, &QueryMethod::Answer, questions.near_contact},
                         {}});
     Measured& last = measured.back();
-    // Depths do not depend on a tolerance.
-    if (method->knows_depth() && each.family != TradeFamily::kTolerance) {
+    if (method->knows_depth()) {
       last.depth.emplace(method, &QueryMethod::MeasureDepths, questions.depth);
       last.depth->RunFirst(settings.max_seconds);
     }

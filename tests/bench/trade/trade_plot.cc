@@ -167,7 +167,7 @@ class PanelDrawing {
     out_ << "<rect x=\"" << Number(left_) << "\" y=\"" << Number(kTop) << "\" width=\""
          << Number(kPanelWidth) << "\" height=\"" << Number(kPanelHeight + kBandHeight)
          << "\" fill=\"none\" stroke=\"#333333\"/>\n";
-    Text(out_, left_ + kPanelWidth / 2, bottom + 40, "time per question (ns), one thread",
+    Text(out_, left_ + kPanelWidth / 2, bottom + 40, "time per query (ns), one thread",
          "text-anchor=\"middle\"");
   }
 
@@ -224,7 +224,7 @@ class PanelDrawing {
 Panel AnswersPanel(const Trade& trade, std::string title,
                    std::optional<TradeAnswers> TradeRow::*answers) {
   Panel panel{std::move(title),
-              "wrong answers (% of questions)",
+              "wrong answers (% of queries)",
               "none",
               -1,
               2,
@@ -285,7 +285,7 @@ void WriteTradePlot(const Trade& trade, std::ostream& out) {
       << "\" font-family=\"Helvetica, Arial, sans-serif\" font-size=\"12\">\n"
       << "<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n";
   const Panel panels[] = {
-      AnswersPanel(trade, "Ordinary questions", &TradeRow::ordinary),
+      AnswersPanel(trade, "Ordinary queries", &TradeRow::ordinary),
       AnswersPanel(trade, "Near contact (1e-6 and less)", &TradeRow::near_contact),
       DepthPanel(trade)};
   double left = kLeft;
@@ -307,7 +307,7 @@ void WriteTradePlot(const Trade& trade, std::ostream& out) {
     Text(out, x + 16, y, LegendText(row));
   }
   Text(out, kLeft - 48, height - 14,
-       "Hollow marks leave questions open: they answer WITHIN_TOLERANCE. tau, errors of "
+       "Hollow marks leave queries open: they answer WITHIN_TOLERANCE. tau, errors of "
        "simplification and of depth are relative to the hulls' mean radius.",
        "fill=\"#333333\"");
   out << "</svg>\n";
