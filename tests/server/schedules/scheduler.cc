@@ -40,6 +40,8 @@ std::string LineOf(const std::source_location& where) {
 
 }  // namespace
 
+std::vector<Scheduler::Step> Scheduler::spare_steps_;
+
 Scheduler& Scheduler::Current() {
   HULLD_CHECK(current != nullptr);
   return *current;
@@ -58,7 +60,9 @@ Scheduler::Scheduler(uint64_t seed) : choices_(seed), random_(choices_.Next()) {
   constexpr uint32_t kRarities[] = {0, 0, 0, 200, 20};
   timeouts_ = kRarities[choices_.Below(5)];
   spurious_ = kRarities[choices_.Below(5)];
+  steps_.swap(spare_steps_);
   steps_.reserve(1024);
+  threads_.reserve(32);
 }
 
 Scheduler::~Scheduler() {
@@ -66,19 +70,22 @@ Scheduler::~Scheduler() {
     if (thread.status != Status::kDone) thread.fiber->Abandon();
   }
   if (current == this) current = nullptr;
+  steps_.clear();
+  spare_steps_.swap(steps_);
 }
 
 std::optional<ScheduleFault> Scheduler::Run(std::function<void()> body) {
   HULLD_CHECK(current == nullptr && threads_.empty());
   current = this;
   threads_.push_back({.fiber = TakeFiber(), .name = "test"});
+  ready_.push_back(0);
   threads_.front().fiber->Start(std::move(body));
   next_ = 0;
   while (next_ != kNobody) {
     running_ = next_;
     if (threads_[running_].fiber->Resume()) {
       Fiber* const fiber = threads_[running_].fiber;
-      threads_[running_].status = Status::kDone;
+      SetStatus(running_, Status::kDone);
       Record("ends", nullptr, {});
       Unblock(fiber);
       IdleFibers().push_back(fiber);
@@ -130,26 +137,30 @@ void Scheduler::GoOn() {
 
 std::optional<size_t> Scheduler::Choose() {
   if (timeouts_ > 0 || spurious_ > 0) MayWakeOne();
-  ready_.clear();
-  for (size_t i = 0; i < threads_.size(); ++i) {
-    if (threads_[i].status == Status::kReady) ready_.push_back(static_cast<uint16_t>(i));
-  }
   if (ready_.empty()) return std::nullopt;
-  return ChooseAmong(ready_);
-}
-
-size_t Scheduler::ChooseAmong(const std::vector<uint16_t>& ready) {
   if (by_priority_) {
     for (; !change_points_.empty() && steps_.size() > change_points_.back();
          change_points_.pop_back()) {
       threads_[running_].priority = --lowest_priority_;
     }
-    return *std::ranges::max_element(ready, {},
+    return *std::ranges::max_element(ready_, {},
                                      [this](uint16_t i) { return threads_[i].priority; });
   }
   const bool stays = stickiness_ > 0 && threads_[running_].status == Status::kReady &&
                      choices_.Below(16) < stickiness_;
-  return stays ? running_ : ready[choices_.Below(static_cast<uint32_t>(ready.size()))];
+  return stays ? running_ : ready_[choices_.Below(static_cast<uint32_t>(ready_.size()))];
+}
+
+void Scheduler::SetStatus(size_t thread, Status status) {
+  threads_[thread].status = status;
+  const auto number = static_cast<uint16_t>(thread);
+  const auto place = std::ranges::lower_bound(ready_, number);
+  const bool is_listed = place != ready_.end() && *place == number;
+  if (status == Status::kReady) {
+    if (!is_listed) ready_.insert(place, number);
+  } else if (is_listed) {
+    ready_.erase(place);
+  }
 }
 
 // Wakes a waiting thread by its time limit or spuriously. Only if other threads can run: a thread
@@ -157,18 +168,17 @@ size_t Scheduler::ChooseAmong(const std::vector<uint16_t>& ready) {
 void Scheduler::MayWakeOne() {
   const bool by_time = choices_.OneIn(timeouts_);
   if (!by_time && !choices_.OneIn(spurious_)) return;
-  ready_.clear();
-  bool any_ready = false;
+  if (ready_.empty()) return;
+  waiting_.clear();
   for (size_t i = 0; i < threads_.size(); ++i) {
     const ThreadState& thread = threads_[i];
-    any_ready = any_ready || thread.status == Status::kReady;
     if (thread.status != Status::kWaiting) continue;
-    if (!by_time || thread.deadline != kNoDeadline) ready_.push_back(static_cast<uint16_t>(i));
+    if (!by_time || thread.deadline != kNoDeadline) waiting_.push_back(static_cast<uint16_t>(i));
   }
-  if (!any_ready || ready_.empty()) return;
-  const uint16_t woken = ready_[choices_.Below(static_cast<uint32_t>(ready_.size()))];
+  if (waiting_.empty()) return;
+  const uint16_t woken = waiting_[choices_.Below(static_cast<uint32_t>(waiting_.size()))];
   ThreadState& thread = threads_[woken];
-  thread.status = Status::kReady;
+  SetStatus(woken, Status::kReady);
   thread.was_notified = !by_time;
   if (by_time) now_ = std::max(now_, thread.deadline);
   steps_.push_back({woken,
@@ -182,6 +192,7 @@ void Scheduler::MayWakeOne() {
 size_t Scheduler::StartThread(std::function<void()> task, const char* name, const Location& where) {
   const size_t thread = threads_.size();
   threads_.push_back({.fiber = TakeFiber(), .name = name, .started = where});
+  ready_.push_back(static_cast<uint16_t>(thread));
   if (by_priority_) threads_.back().priority = 1 + choices_.Below(1U << 30);
   threads_.back().fiber->Start(std::move(task));
   Yield("starts a thread", nullptr, where);
@@ -196,7 +207,7 @@ void Scheduler::JoinThread(size_t thread) {
 
 void Scheduler::Block(const char* what, const void* object, const Location& where) {
   ThreadState& self = threads_[running_];
-  self.status = Status::kBlocked;
+  SetStatus(running_, Status::kBlocked);
   self.what = what;
   self.object = object;
   self.where = where;
@@ -205,10 +216,9 @@ void Scheduler::Block(const char* what, const void* object, const Location& wher
 }
 
 void Scheduler::Unblock(const void* object) {
-  for (ThreadState& thread : threads_) {
-    if (thread.status == Status::kBlocked && thread.object == object) {
-      thread.status = Status::kReady;
-    }
+  for (size_t i = 0; i < threads_.size(); ++i) {
+    const ThreadState& thread = threads_[i];
+    if (thread.status == Status::kBlocked && thread.object == object) SetStatus(i, Status::kReady);
   }
 }
 
@@ -216,7 +226,7 @@ bool Scheduler::Wait(const void* object, int64_t deadline, const Condition& cond
                      const Location& where) {
   const size_t self = running_;
   ThreadState& thread = threads_[self];
-  thread.status = Status::kWaiting;
+  SetStatus(self, Status::kWaiting);
   thread.what = "waits on a condition";
   thread.object = object;
   thread.deadline = deadline;
@@ -234,21 +244,21 @@ void Scheduler::WaitUntil(const void* object, const Condition& condition, const 
 
 void Scheduler::Notify(const void* object, bool all, const Location& where) {
   Yield(all ? "notifies all" : "notifies one", object, where);
-  ready_.clear();
+  waiting_.clear();
   for (size_t i = 0; i < threads_.size(); ++i) {
     const ThreadState& thread = threads_[i];
     if (thread.status == Status::kWaiting && thread.object == object) {
-      ready_.push_back(static_cast<uint16_t>(i));
+      waiting_.push_back(static_cast<uint16_t>(i));
     }
   }
-  if (ready_.empty()) return;
-  const uint32_t chosen = choices_.Below(static_cast<uint32_t>(ready_.size()));
-  for (uint32_t i = 0; i < ready_.size(); ++i) {
+  if (waiting_.empty()) return;
+  const uint32_t chosen = choices_.Below(static_cast<uint32_t>(waiting_.size()));
+  for (uint32_t i = 0; i < waiting_.size(); ++i) {
     if (!all && i != chosen) continue;
-    ThreadState& thread = threads_[ready_[i]];
-    thread.status = Status::kReady;
+    ThreadState& thread = threads_[waiting_[i]];
+    SetStatus(waiting_[i], Status::kReady);
     thread.was_notified = true;
-    steps_.push_back({ready_[i], "is woken", object, {}, thread.where, true});
+    steps_.push_back({waiting_[i], "is woken", object, {}, thread.where, true});
   }
 }
 

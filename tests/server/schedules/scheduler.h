@@ -132,11 +132,14 @@ class Scheduler {
     bool is_given;
   };
 
+  // Memory for the steps of the next schedule.
+  static std::vector<Step> spare_steps_;
+
   void Record(const char* what, const void* object, const Location& where);
   void GoOn();
   std::optional<size_t> Choose();
   void MayWakeOne();
-  size_t ChooseAmong(const std::vector<uint16_t>& ready);
+  void SetStatus(size_t thread, Status status);
   void Suspend();
   ScheduleFault Stuck() const;
   std::string NameOf(size_t thread) const;
@@ -155,7 +158,10 @@ class Scheduler {
 
   int64_t now_ = 0;
   std::vector<ThreadState> threads_;
+  // Threads that can run, ascending.
   std::vector<uint16_t> ready_;
+  // Temporary.
+  std::vector<uint16_t> waiting_;
   size_t running_ = 0;
   // The next thread to resume.
   size_t next_ = 0;
