@@ -412,18 +412,38 @@ const char* SmallDae() {
 )";
 }
 
-// LAS 1.2 with two points of format 0, scale 1 and offset 0.
-std::string SmallLas() {
-  std::string las(227, '\0');
+// The binary container of glTF, with a JSON chunk and a chunk of three points.
+std::string SmallGlb() {
+  const auto word = [](size_t number) {
+    const auto value = static_cast<uint32_t>(number);
+    return std::string(reinterpret_cast<const char*>(&value), sizeof(value));
+  };
+  std::string json =
+      R"({"asset":{"version":"2.0"},"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],)"
+      R"("meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],"buffers":[{"byteLength":36}],)"
+      R"("bufferViews":[{"buffer":0,"byteLength":36}],"accessors":[{"bufferView":0,)"
+      R"("componentType":5126,"count":3,"type":"VEC3"}]})";
+  json.resize((json.size() + 3) / 4 * 4, ' ');
+  const std::string chunks = word(json.size()) + "JSON" + json + word(36) +
+                             std::string("BIN\0", 4) + std::string(36, '\x3f');
+  return "glTF" + word(2) + word(12 + chunks.size()) + chunks;
+}
+
+// LAS 1.2 or 1.4 with two points of format 0, scale 1 and offset 0.
+std::string SmallLas(int minor) {
+  const size_t header = minor < 4 ? 227 : 375;
+  std::string las(header, '\0');
   const auto put = [&las](size_t at, const auto& value) {
     std::memcpy(las.data() + at, &value, sizeof(value));
   };
   las.replace(0, 4, "LASF");
-  put(24, uint16_t{0x0201});
-  put(94, uint16_t{227});
-  put(96, uint32_t{227});
+  put(24, uint8_t{1});
+  put(25, static_cast<uint8_t>(minor));
+  put(94, static_cast<uint16_t>(header));
+  put(96, static_cast<uint32_t>(header));
   put(105, uint16_t{20});
-  put(107, uint32_t{2});
+  put(107, uint32_t{minor < 4 ? 2U : 0U});
+  if (minor == 4) put(247, uint64_t{2});
   for (size_t axis = 0; axis < 3; ++axis) put(131 + 8 * axis, 1.0);
   return las + std::string(40, '\x01');
 }
@@ -460,13 +480,16 @@ std::vector<SeedFile> SeedFiles() {
       {FileKind::kPcd, CompressedPcd()},
       {FileKind::kXyz, "1,2,3\n4, 5, 6,7\n8;9;10\n"},
       {FileKind::kXyz, "2\n1 2 3 -9 255 0 0\n4 5 6\n1\n7 8 9\n"},
-      {FileKind::kLas, SmallLas()},
+      {FileKind::kLas, SmallLas(2)},
+      {FileKind::kLas, SmallLas(4)},
       {FileKind::kStl, SmallStl()},
       {FileKind::kStl, SmallBinaryStl()},
       {FileKind::kStlMesh, SmallStl()},
       {FileKind::kStlMesh, SmallBinaryStl()},
       {FileKind::kGltf, SmallGltf()},
       {FileKind::kGltfMesh, SmallGltf()},
+      {FileKind::kGltf, SmallGlb()},
+      {FileKind::kGltfMesh, SmallGlb()},
       {FileKind::kDae, SmallDae()},
       {FileKind::kDaeMesh, SmallDae()},
       {FileKind::kObjMesh, "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1/1 2//2 -1/3/3 4\n"},

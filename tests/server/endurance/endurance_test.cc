@@ -607,18 +607,19 @@ TEST_F(Endurance, AllAnswersAreRightAndNoResourceLeaks) {
     for (std::thread& thread : threads) thread.join();
     for (const auto& client : clients) client->LookAtAll();
     // A freshly started server has fewer.
-    if (round >= kWarmRounds) held.push_back(HoldingsOf(server_->pid()));
+    if (round < kWarmRounds) continue;
+    held.push_back(HoldingsOf(server_->pid()));
+    std::printf("round %d: %lld KiB, %lld threads, %lld descriptors\n", round,
+                static_cast<long long>(held.back().resident_kib),
+                static_cast<long long>(held.back().threads),
+                static_cast<long long>(held.back().descriptors));
+    std::fflush(stdout);
   }
   uint64_t verified = 0;
   for (const auto& client : clients) verified += client->verified();
   std::printf("seed %llu: %d rounds, %d kills, full disks: %d, certificates checked: %llu\n%s",
               static_cast<unsigned long long>(seed), rounds, kills, full_disks,
               static_cast<unsigned long long>(verified), tally.Text().c_str());
-  for (const Holdings& h : held) {
-    std::printf("%lld KiB, %lld threads, %lld descriptors\n",
-                static_cast<long long>(h.resident_kib), static_cast<long long>(h.threads),
-                static_cast<long long>(h.descriptors));
-  }
   ASSERT_GE(held.size(), 2u);
   // The numbers of clients and hulls are constant; caches of the store and of memory may differ.
   const size_t half = held.size() / 2;

@@ -21,7 +21,7 @@ constexpr uint64_t kSchedules = 50'000;
 #endif
 
 // Long runs report their progress after each block.
-constexpr uint64_t kBlock = 1'000'000;
+constexpr uint64_t kBlock = 200'000;
 
 void ExpectAllReached(const Reached& reached) {
   EXPECT_GT(reached.refused, 100);
