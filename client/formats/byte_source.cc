@@ -180,6 +180,24 @@ std::string_view ByteSource::Peek(size_t size) {
   return {buffer_.data() + begin_, std::min(size, end_ - begin_)};
 }
 
+absl::Status ByteSource::CheckEnd(const std::string& declared, uint64_t record_bytes,
+                                  uint64_t limit) {
+  const uint64_t begin = offset();
+  bool is_padding = true;
+  do {
+    const uint64_t left = limit - (offset() - begin);
+    const std::string_view bytes =
+        Peek(static_cast<size_t>(std::min<uint64_t>(left, kBufferBytes)));
+    is_padding = is_padding && bytes.find_first_not_of('\0') == std::string_view::npos;
+    begin_ += bytes.size();
+  } while (offset() - begin < limit && !at_end_);
+  const uint64_t count = offset() - begin;
+  if (is_padding || count < record_bytes) return status_;
+  return absl::InvalidArgumentError(
+      absl::StrCat(name_, ": byte ", begin, ": ", count, " bytes follow the ", declared,
+                   " that the header declares; correct its count, or cut the file here"));
+}
+
 absl::Status ByteSource::ErrorAtLine(const std::string& message) const {
   return absl::InvalidArgumentError(absl::StrCat(name_, ":", line_, ": ", message));
 }

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -49,6 +50,12 @@ class ByteSource {
   // Returns an error if the first bytes show that the file is compressed or UTF-16 text, which
   // binary readers would misread. Consumes nothing.
   absl::Status CheckStart();
+
+  // Reads up to the end of the file, or up to `limit` bytes. INVALID_ARGUMENT: these bytes could
+  // contain a further record, because their number is at least `record_bytes` and not all are zero;
+  // other bytes are padding. declared: the records before them, for the error, as in "2 points".
+  absl::Status CheckEnd(const std::string& declared, uint64_t record_bytes,
+                        uint64_t limit = std::numeric_limits<uint64_t>::max());
 
   // Returns the error that stopped reading; OK at the end of the file.
   const absl::Status& status() const { return status_; }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -56,22 +57,29 @@ bool IsHeader(const std::vector<std::string_view>& cells) {
   return true;
 }
 
-// Returns the axis that a column is named after.
+// Returns the axis that a column is named after: x, or Points:0 as ParaView writes it.
 std::optional<size_t> AxisOf(std::string_view cell) {
-  std::string name = absl::AsciiStrToLower(std::string(cell));
-  const bool is_paraview = name.starts_with("points:") || name.starts_with("points_");
-  if (is_paraview) name.erase(0, 7);
-  const size_t axis = std::string_view(is_paraview ? "012" : "xyz").find(name);
-  if (name.size() == 1 && axis != std::string_view::npos) return axis;
-  return std::nullopt;
+  const std::string name = absl::AsciiStrToLower(std::string(cell));
+  for (size_t axis = 0; axis < 3; ++axis) {
+    if (name == absl::StrCat("points:", axis) || name == absl::StrCat("points_", axis)) return axis;
+  }
+  return AxisNamed(name);
+}
+
+// Returns the axis that a column is named after with a unit, as in X [m], or a path, as in field.x.
+std::optional<size_t> AxisOfQualified(std::string_view cell) {
+  const std::string_view name = Trim(cell.substr(0, cell.find_first_of("[(")));
+  return AxisNamed(name.substr(name.rfind('.') + 1));
 }
 
 absl::Status FindColumns(const ByteSource& source, std::string_view line,
                          const std::vector<std::string_view>& header,
                          std::array<size_t, 3>* columns) {
   std::array<std::optional<size_t>, 3> found;
+  const bool is_qualified = std::none_of(header.begin(), header.end(), AxisOf);
   for (size_t i = 0; i < header.size(); ++i) {
-    const std::optional<size_t> axis = AxisOf(header[i]);
+    const std::optional<size_t> axis =
+        is_qualified ? AxisOfQualified(header[i]) : AxisOf(header[i]);
     if (!axis) continue;
     if (found[*axis]) {
       return source.ErrorAtLine(absl::StrCat(
@@ -89,6 +97,19 @@ absl::Status FindColumns(const ByteSource& source, std::string_view line,
     (*columns)[axis] = *found[axis];
   }
   return absl::OkStatus();
+}
+
+// Returns true if the cells are the numbers of their columns, as pandas names columns without
+// names.
+bool AreNumbered(std::span<const std::string_view> cells) {
+  for (size_t i = 0; i < cells.size(); ++i) {
+    if (cells[i] != absl::StrCat(i)) return false;
+  }
+  return cells.size() >= 3;
+}
+
+bool IsInteger(std::string_view cell) {
+  return cell.find_first_not_of("+-0123456789") == std::string_view::npos;
 }
 
 absl::Status AddRow(const ByteSource& source, const std::vector<std::string_view>& cells,
@@ -118,7 +139,7 @@ absl::Status AddRow(const ByteSource& source, const std::vector<std::string_view
 }  // namespace
 
 bool IsCsvComment(std::string_view line) {
-  return line.substr(0, 1) == "#" || line.substr(0, 2) == "//";
+  return line.starts_with('#') || line.starts_with('%') || line.starts_with("//");
 }
 
 absl::StatusOr<std::optional<CsvLayout>> CsvHeader(const ByteSource& source, std::string_view line,
@@ -128,16 +149,42 @@ absl::StatusOr<std::optional<CsvLayout>> CsvHeader(const ByteSource& source, std
   layout.separator = separator.value_or(SeparatorOf(line));
   std::vector<std::string_view> cells;
   SplitRow(line, layout.separator, &cells);
+  // White space also precedes a unit, as in "X [m] Y [m] Z [m]".
+  if (layout.separator == ' ') {
+    std::erase_if(cells, [](std::string_view cell) { return cell.find_first_of("[(") == 0; });
+  }
   const absl::Status status = FindColumns(source, line, cells, &layout.columns);
   layout.named = cells.size();
   if (status.ok()) return layout;
   if (IsHeader(cells)) return status;
-  return std::nullopt;
+  // pandas leaves the name of the index empty.
+  if (!cells.front().empty() || !AreNumbered(std::span(cells).subspan(1))) return std::nullopt;
+  layout.columns = {1, 2, 3};
+  return layout;
+}
+
+absl::Status CheckFirstRow(ByteSource* source, std::string_view row, std::optional<char> declared) {
+  const char separator = declared.value_or(SeparatorOf(row));
+  std::vector<std::string_view> cells;
+  SplitRow(row, separator, &cells);
+  if (!AreNumbered(cells)) return absl::OkStatus();
+  constexpr size_t kBytesOfRow = 4096;
+  std::string_view next = source->Peek(kBytesOfRow);
+  next.remove_prefix(std::min(next.find_first_not_of(" \t\r\n"), next.size()));
+  next = next.substr(0, next.find_first_of("\r\n"));
+  SplitRow(next, separator, &cells);
+  if (IsCsvComment(next) || std::all_of(cells.begin(), cells.end(), IsInteger)) {
+    return absl::OkStatus();
+  }
+  return source->ErrorAtLine(
+      absl::StrCat(Quoted(row),
+                   " may be a point, or a header that numbers the columns, as pandas "
+                   "writes it; replace a header by x,y,z; put x,y,z above a point"));
 }
 
 std::optional<CsvLayout> CsvHeaderInComment(const ByteSource& source, std::string_view line,
                                             std::optional<char> separator) {
-  line.remove_prefix(std::min(line.find_first_not_of("/#"), line.size()));
+  line.remove_prefix(std::min(line.find_first_not_of("/#%"), line.size()));
   return CsvHeader(source, line, separator).value_or(std::nullopt);
 }
 
@@ -183,7 +230,9 @@ absl::Status ReadCsv(ByteSource* source, PointCollector* points) {
     if (header->has_value()) return ReadCsvRows(source, **header, "", points);
     CsvLayout layout;
     layout.separator = declared.value_or(SeparatorOf(content));
-    return ReadCsvRows(source, layout, line, points);
+    const std::string row(line);
+    const absl::Status checked = CheckFirstRow(source, row, layout.separator);
+    return checked.ok() ? ReadCsvRows(source, layout, row, points) : checked;
   }
   return source->status();
 }

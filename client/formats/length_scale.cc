@@ -22,23 +22,23 @@ constexpr size_t kMaxDigits = 18;
 // digits.
 constexpr int64_t kMaxExponent = int64_t{1} << 40;
 
-// Requires a finite number that ParseDouble accepts.
+// Requires a finite number that ParseCoordinate accepts.
 Decimal Split(std::string_view text) {
   Decimal decimal;
   decimal.negative = text[0] == '-';
   if (text[0] == '-' || text[0] == '+') text.remove_prefix(1);
-  size_t i = 0;
+  const size_t letter = text.find_first_of("eEdD");
   bool in_fraction = false;
-  for (; i < text.size() && text[i] != 'e' && text[i] != 'E'; ++i) {
-    if (text[i] == '.') {
+  for (const char c : text.substr(0, letter)) {
+    if (c == '.') {
       in_fraction = true;
       continue;
     }
-    decimal.digits += text[i];
+    decimal.digits += c;
     decimal.exponent -= in_fraction ? 1 : 0;
   }
-  if (i == text.size()) return decimal;
-  text.remove_prefix(i + 1);
+  if (letter == std::string_view::npos) return decimal;
+  text.remove_prefix(letter + 1);
   if (text[0] == '+') text.remove_prefix(1);
   int64_t written = 0;
   const auto parsed = std::from_chars(text.data(), text.data() + text.size(), written);
@@ -99,7 +99,7 @@ std::string LengthScale::Product(std::string_view text) const {
 }
 
 NumberText LengthScale::Parse(std::string_view text, double* value) const {
-  const NumberText kind = ParseDouble(text, value);
+  const NumberText kind = ParseCoordinate(text, value);
   const bool is_decimal =
       kind == NumberText::kTooLarge || (kind == NumberText::kNumber && std::isfinite(*value));
   if (is_one() || !is_decimal) return kind;

@@ -29,12 +29,13 @@ class LengthScale {
   // Returns x times the scale.
   double Apply(double x) const;
 
-  // Parses `text` as ParseDouble does and sets `value` to the exact decimal number times the scale.
-  // Only the product is rounded: 0.1 inches are 0.00254 meters.
+  // Parses `text` as ParseCoordinate does and sets `value` to the exact decimal number times the
+  // scale. Only the product is rounded: 0.1 inches are 0.00254 meters.
   NumberText Parse(std::string_view text, double* value) const;
 
  private:
-  // Returns the exact product with `text`, a finite decimal number that ParseDouble accepts.
+  // Returns the exact product with `text`, a finite decimal number that ParseCoordinate
+  // accepts.
   std::string Product(std::string_view text) const;
 
   // mantissa_ * 10^exponent_; the mantissa does not end in 0.

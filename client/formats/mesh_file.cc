@@ -23,7 +23,7 @@ absl::Status AddVertex(const ByteSource& source, std::string_view text, Triangle
   for (double& coordinate : p) {
     const std::string_view token = NextToken(&text);
     if (token.empty()) return source.ErrorAtLine("a vertex needs 3 coordinates");
-    const NumberText kind = ParseDouble(token, &coordinate);
+    const NumberText kind = ParseCoordinate(token, &coordinate);
     if (kind != NumberText::kNumber) return source.ErrorAtLine(NumberProblem(kind, token));
     if (!std::isfinite(coordinate)) {
       return source.ErrorAtLine(Quoted(token) + " is not finite");
@@ -162,7 +162,7 @@ absl::Status ReadStlParts(ByteSource* source, std::vector<MeshPart>* parts) {
     present = entry->second;
   };
   receiver.parse = [](std::string_view text, size_t, double* value) {
-    return ParseDouble(text, value);
+    return ParseCoordinate(text, value);
   };
   receiver.corner = [&](const std::array<double, 3>& p, const StlErrorAt& error_at) {
     if (!std::isfinite(p[0]) || !std::isfinite(p[1]) || !std::isfinite(p[2])) {

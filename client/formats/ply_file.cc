@@ -121,10 +121,7 @@ absl::Status ParseProperty(const ByteSource& source, std::string_view rest, PlyH
   property.type = *type;
   const std::string_view name = NextToken(&rest);
   if (name.empty()) return source.ErrorAtLine("the property has no name");
-  const size_t axis = std::string_view("xyz").find(name);
-  if (name.size() == 1 && axis != std::string_view::npos && !property.count_type) {
-    property.axis = axis;
-  }
+  if (!property.count_type) property.axis = AxisNamed(name);
   property.is_corners = property.count_type && type != ScalarType::kFloat &&
                         type != ScalarType::kDouble &&
                         (name == "vertex_indices" || name == "vertex_index");
@@ -299,8 +296,9 @@ class BinaryBody {
                             static_cast<float>(xyz[2]), error_at);
   }
 
-  // Writers may pad the file.
-  static absl::Status Finish() { return absl::OkStatus(); }
+  absl::Status Finish() {
+    return source_->CheckEnd("last element", source_->offset() - element_offset_);
+  }
 
   absl::Status Error(const std::string& message) const {
     return absl::InvalidArgumentError(

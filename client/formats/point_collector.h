@@ -36,6 +36,8 @@ struct ReadOptions {
   bool skip_nonfinite = false;
   // Counts and skips points at exactly (0, 0, 0), which depth cameras write for missing data.
   bool skip_zero = false;
+  // Accepts a file without points.
+  bool allow_empty = false;
   // Factors of x, y, and z. Scaled coordinates are doubles.
   std::array<LengthScale, 3> scale;
 };
@@ -46,6 +48,8 @@ struct ReadCounts {
   uint64_t skipped = 0;
   // Points skipped because all coordinates are 0.
   uint64_t zeros = 0;
+
+  bool is_empty() const { return points + skipped + zeros == 0; }
 };
 
 // Collects the points of a reader into blocks, scales them, and skips the points that the options

@@ -27,32 +27,28 @@ constexpr FormatName kFormatNames[] = {
     {"laz", PointFormat::kLas}, {"xyzn", PointFormat::kXyz},  {"xyzrgb", PointFormat::kXyz},
 };
 
-absl::Status ReadText(const ReadRequest& request, PointCollector* points) {
-  absl::StatusOr<std::unique_ptr<ByteSource>> source = ByteSource::Open(request.path);
-  if (!source.ok()) return source.status();
-  (*source)->ReportProgress(request.progress);
-  if (absl::Status status = (*source)->CheckStart(); !status.ok()) return status;
-  switch (request.format) {
+absl::Status ReadFormat(PointFormat format, ByteSource* source, PointCollector* points) {
+  switch (format) {
     case PointFormat::kObj:
-      return ReadObj(source->get(), points);
+      return ReadObj(source, points);
     case PointFormat::kOff:
-      return ReadOff(source->get(), points);
+      return ReadOff(source, points);
     case PointFormat::kPly:
-      return ReadPly(source->get(), points);
+      return ReadPly(source, points);
     case PointFormat::kXyz:
-      return ReadXyz(source->get(), points);
+      return ReadXyz(source, points);
     case PointFormat::kCsv:
-      return ReadCsv(source->get(), points);
+      return ReadCsv(source, points);
     case PointFormat::kPcd:
-      return ReadPcd(source->get(), points);
+      return ReadPcd(source, points);
     case PointFormat::kLas:
-      return ReadLas(source->get(), points);
+      return ReadLas(source, points);
     case PointFormat::kStl:
-      return ReadStl(source->get(), points);
+      return ReadStl(source, points);
     case PointFormat::kGltf:
-      return ReadGltf(source->get(), points);
+      return ReadGltf(source, points);
     case PointFormat::kDae:
-      return ReadDae(source->get(), points);
+      return ReadDae(source, points);
   }
   return absl::InternalError("unknown format");
 }
@@ -96,10 +92,17 @@ bool IsMeshFormat(PointFormat format) {
 }
 
 absl::StatusOr<ReadCounts> ReadPoints(const ReadRequest& request, const BlockReceiver& receive) {
+  const auto source = ByteSource::Open(request.path);
+  if (!source.ok()) return source.status();
+  (*source)->ReportProgress(request.progress);
   PointCollector points(request.options, receive);
-  if (absl::Status status = ReadText(request, &points); !status.ok()) return status;
-  if (absl::Status status = points.Flush(); !status.ok()) return status;
-  return points.counts();
+  absl::Status status = (*source)->CheckStart();
+  if (status.ok()) status = ReadFormat(request.format, source->get(), &points);
+  if (status.ok()) status = points.Flush();
+  if (!status.ok()) return status;
+  const ReadCounts& counts = points.counts();
+  if (request.options.allow_empty || !counts.is_empty()) return counts;
+  return absl::InvalidArgumentError(absl::StrCat((*source)->name(), ": contains no points"));
 }
 
 absl::Status AddTextPoint(const ByteSource& source, std::string_view text, PointCollector* points) {

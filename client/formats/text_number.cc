@@ -97,6 +97,22 @@ NumberText ParseDouble(std::string_view text, double* value) {
   return NumberText::kNumber;
 }
 
+NumberText ParseCoordinate(std::string_view text, double* value) {
+  const NumberText kind = ParseDouble(text, value);
+  const size_t letter = text.find_first_of("dD");
+  if (kind != NumberText::kNoNumber || letter == std::string_view::npos || letter == 0) return kind;
+  if (!IsDigit(text[letter - 1]) && text[letter - 1] != '.') return kind;
+  std::string number(text);
+  number[letter] = 'E';
+  return ParseDouble(number, value);
+}
+
+std::optional<size_t> AxisNamed(std::string_view name) {
+  const size_t axis = std::string_view("xyzXYZ").find(name);
+  if (name.size() != 1 || axis == std::string_view::npos) return std::nullopt;
+  return axis % 3;
+}
+
 bool ParseUnsigned(std::string_view text, uint64_t* value) {
   const char* const end = text.data() + text.size();
   const auto [stop, error] = std::from_chars(text.data(), end, *value);

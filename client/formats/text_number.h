@@ -4,6 +4,7 @@
 #include <absl/status/status.h>
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -23,8 +24,15 @@ enum class NumberText {
 // infinity and NaN. Independent of the locale.
 NumberText ParseDouble(std::string_view text, double* value);
 
+// Parses a coordinate of a file: as ParseDouble, but the letter of the exponent may also be D, as
+// Fortran writes it.
+NumberText ParseCoordinate(std::string_view text, double* value);
+
 // Parses an unsigned decimal number that fits in 64 bits.
 bool ParseUnsigned(std::string_view text, uint64_t* value);
+
+// Returns 0, 1, or 2 for a name that is x, y, or z, in either letter case.
+std::optional<size_t> AxisNamed(std::string_view name);
 
 // Returns the shortest decimal text that ParseDouble reads back as the same bits.
 std::string ShortestText(double value);

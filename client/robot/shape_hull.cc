@@ -72,8 +72,6 @@ absl::StatusOr<ShapeHull> MeshHull(const CollisionShape& shape, const std::strin
     return absl::OkStatus();
   });
   if (!counts.ok()) return counts.status();
-  if (hull.xyz.empty())
-    return absl::InvalidArgumentError(absl::StrCat(file, ": contains no vertices"));
   return hull;
 }
 

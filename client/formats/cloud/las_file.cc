@@ -8,16 +8,19 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <vector>
 
 #include "client/formats/binary_scalar.h"
 #include "client/formats/point_file.h"
+#include "client/formats/text_number.h"
 
 namespace hulld {
 namespace {
 
-// Header sizes of LAS 1.0 to 1.2, and of 1.4, in bytes.
+// Header sizes of LAS 1.0 to 1.2, of 1.3, and of 1.4, in bytes.
 constexpr size_t kLasHeaderBytes = 227;
+constexpr size_t kHeader13Bytes = 235;
 constexpr size_t kHeader14Bytes = 375;
 // Record sizes of point formats 0 to 10, in bytes; extra bytes may follow.
 constexpr uint16_t kRecordBytes[] = {20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67};
@@ -25,8 +28,8 @@ constexpr uint16_t kRecordBytes[] = {20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67}
 struct Header {
   uint64_t first_point = 0;
   uint64_t point_count = 0;
-  // LAS 1.4 only: other records may follow the points.
-  bool has_extended_count = false;
+  // Start of the records after the points, which LAS 1.3 introduced.
+  uint64_t next_records = std::numeric_limits<uint64_t>::max();
   uint64_t record_bytes = 0;
   std::array<double, 3> scale = {};
   std::array<double, 3> offset = {};
@@ -39,26 +42,39 @@ Scalar Load(const std::vector<unsigned char>& bytes, size_t at) {
   return value;
 }
 
-// Reads the number of points. LAS 1.4 also has a 64-bit field; a field of 0 is not set.
-absl::Status ReadPointCount(ByteSource* source, std::vector<unsigned char>* bytes, Header* header) {
-  header->point_count = Load<uint32_t>(*bytes, 107);
-  if (Load<uint8_t>(*bytes, 25) < 4) return absl::OkStatus();
-  bytes->resize(kHeader14Bytes);
-  if (const uint16_t size = Load<uint16_t>(*bytes, 94); size < kHeader14Bytes) {
+// Reads the fields of LAS 1.3 and 1.4. They remain 0 in the header of an earlier version.
+absl::Status ReadLaterFields(ByteSource* source, std::vector<unsigned char>* bytes) {
+  const int minor = (*bytes)[25];
+  const uint16_t size = Load<uint16_t>(*bytes, 94);
+  if (minor == 4 && size < kHeader14Bytes) {
     return source->ErrorAtByte(
         absl::StrCat("a LAS 1.4 header has ", kHeader14Bytes, " bytes, not ", size));
   }
-  if (!source->Read(bytes->data() + kLasHeaderBytes, kHeader14Bytes - kLasHeaderBytes)) {
-    return source->Truncated("within the header of LAS 1.4");
+  if (minor < 3 || size < kHeader13Bytes) return absl::OkStatus();
+  const size_t bytes_of_version = minor == 4 ? kHeader14Bytes : kHeader13Bytes;
+  if (source->Read(bytes->data() + kLasHeaderBytes, bytes_of_version - kLasHeaderBytes)) {
+    return absl::OkStatus();
   }
-  const uint64_t count = Load<uint64_t>(*bytes, 247);
-  if (header->point_count != 0 && count != 0 && header->point_count != count) {
-    return source->ErrorAtByte(absl::StrCat("the header declares ", header->point_count,
-                                            " points in its legacy field and ", count,
-                                            " in its LAS 1.4 field; the file is damaged"));
+  return source->Truncated(absl::StrCat("within the header of LAS 1.", minor));
+}
+
+// Reads the number of points, and where they end. LAS 1.4 also has a 64-bit count; a field of 0 is
+// not set.
+absl::Status ReadPointCount(const ByteSource& source, const std::vector<unsigned char>& bytes,
+                            Header* header) {
+  const uint64_t legacy_count = Load<uint32_t>(bytes, 107);
+  const uint64_t count = Load<uint64_t>(bytes, 247);
+  if (legacy_count != 0 && count != 0 && legacy_count != count) {
+    return source.ErrorAtByte(absl::StrCat("the header declares ", legacy_count,
+                                           " points in its legacy field and ", count,
+                                           " in its LAS 1.4 field; the file is damaged"));
   }
-  header->point_count = std::max(header->point_count, count);
-  header->has_extended_count = true;
+  header->point_count = std::max(legacy_count, count);
+  const uint64_t waveforms = Load<uint64_t>(bytes, 227);
+  const uint64_t extended_records = Load<uint32_t>(bytes, 243) > 0 ? Load<uint64_t>(bytes, 235) : 0;
+  for (const uint64_t start : {waveforms, extended_records}) {
+    if (start > 0) header->next_records = std::min(header->next_records, start);
+  }
   return absl::OkStatus();
 }
 
@@ -78,7 +94,7 @@ absl::Status ReadTransform(const ByteSource& source, const std::vector<unsigned 
 }
 
 absl::Status ReadHeader(ByteSource* source, Header* header) {
-  std::vector<unsigned char> bytes(kLasHeaderBytes);
+  std::vector<unsigned char> bytes(kHeader14Bytes);
   if (!source->Read(bytes.data(), 4) || std::memcmp(bytes.data(), "LASF", 4) != 0) {
     return absl::InvalidArgumentError(
         absl::StrCat(source->name(), ": byte 0: a LAS file starts with LASF"));
@@ -109,7 +125,8 @@ absl::Status ReadHeader(ByteSource* source, Header* header) {
   }
   header->first_point = Load<uint32_t>(bytes, 96);
   absl::Status status = ReadTransform(*source, bytes, header);
-  if (status.ok()) status = ReadPointCount(source, &bytes, header);
+  if (status.ok()) status = ReadLaterFields(source, &bytes);
+  if (status.ok()) status = ReadPointCount(*source, bytes, header);
   if (status.ok() && header->first_point < source->offset()) {
     status = source->ErrorAtByte(
         absl::StrCat("the points start at byte ", header->first_point, ", within the header"));
@@ -143,10 +160,11 @@ absl::Status ReadLas(ByteSource* source, PointCollector* points) {
     absl::Status status = points->Add(xyz[0], xyz[1], xyz[2], error_at);
     if (!status.ok()) return status;
   }
-  // An interrupted writer leaves the count at 0.
-  if (header.point_count > 0 || header.has_extended_count || !source->Skip(1))
-    return absl::OkStatus();
-  return error_at("the header declares no points, but more bytes follow; is the file complete?");
+  // An interrupted writer leaves the count too small.
+  const uint64_t end = source->offset();
+  if (header.next_records <= end) return absl::OkStatus();
+  return source->CheckEnd(Counted(header.point_count, "point"), header.record_bytes,
+                          header.next_records - end);
 }
 
 }  // namespace hulld

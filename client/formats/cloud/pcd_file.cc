@@ -142,17 +142,16 @@ absl::Status MakeLayout(const ByteSource& source, const PcdHeader& header, bool 
     if (field.count > kMaxRowBytes || field.size > kMaxScalarBytes) {
       return source.ErrorAtLine(absl::StrCat("field ", Quoted(field.name), " is too large"));
     }
-    const size_t axis = std::string_view("xyz").find(field.name);
-    if (field.name.size() == 1 && axis != std::string_view::npos) {
+    if (const std::optional<size_t> axis = AxisNamed(field.name)) {
       const std::optional<ScalarType> type = TypeOf(field);
-      if (!type || field.count != 1 || found[axis]) {
+      if (!type || field.count != 1 || found[*axis]) {
         return source.ErrorAtLine(
             absl::StrCat("field ", Quoted(field.name),
                          " must occur once, with COUNT 1 and a known TYPE and SIZE"));
       }
-      layout->position[axis] = layout->row;
-      layout->type[axis] = *type;
-      found[axis] = true;
+      layout->position[*axis] = layout->row;
+      layout->type[*axis] = *type;
+      found[*axis] = true;
     }
     layout->row += binary ? field.size * field.count : field.count;
     if (binary && field.name == "_") layout->padding += field.size * field.count;
@@ -254,8 +253,7 @@ absl::Status ReadBinary(ByteSource* source, const Layout& layout, uint64_t count
     absl::Status status = AddBinaryPoint(layout, coordinates, error_at, points);
     if (!status.ok()) return status;
   }
-  if (count > 0 || !source->Skip(1)) return absl::OkStatus();
-  return source->ErrorAtByte("the header declares no points, but data follows");
+  return source->CheckEnd(Counted(count, "point"), layout.row);
 }
 
 // Reads exactly `size` bytes. Memory grows with the available data, not with the declared size.
@@ -312,9 +310,7 @@ absl::Status ReadCompressed(ByteSource* source, const PcdHeader& header, const L
   std::array<const unsigned char*, 3> coordinates = {};
   const unsigned char* field_values = values.data();
   for (const Field& field : header.fields) {
-    const size_t axis =
-        field.name.size() == 1 ? std::string_view("xyz").find(field.name) : std::string_view::npos;
-    if (axis != std::string_view::npos) coordinates[axis] = field_values;
+    if (const auto axis = AxisNamed(field.name)) coordinates[*axis] = field_values;
     if (padded || field.name != "_") field_values += field.size * field.count * count;
   }
   for (uint64_t i = 0; i < count; ++i) {
@@ -325,7 +321,7 @@ absl::Status ReadCompressed(ByteSource* source, const PcdHeader& header, const L
     if (!status.ok()) return status;
     for (size_t axis = 0; axis < 3; ++axis) coordinates[axis] += SizeOf(layout.type[axis]);
   }
-  return absl::OkStatus();
+  return source->CheckEnd(Counted(count, "point"), layout.row);
 }
 
 }  // namespace

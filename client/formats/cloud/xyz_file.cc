@@ -4,6 +4,7 @@
 
 #include <array>
 #include <optional>
+#include <string>
 
 #include "client/formats/csv_reader.h"
 #include "client/formats/point_file.h"
@@ -61,9 +62,10 @@ absl::Status ReadXyz(ByteSource* source, PointCollector* points) {
   std::optional<uint64_t> declared;
   uint64_t found = 0;
   bool first = true;
+  std::string first_row;
   std::optional<CsvLayout> commented;
   for (std::string_view line; source->ReadLine(&line);) {
-    const std::string_view content = Trim(WithoutComment(line));
+    std::string_view content = Trim(WithoutComment(line));
     if (content.empty() || IsCsvComment(content)) {
       if (first && !commented) commented = CsvHeaderInComment(*source, Trim(line));
       continue;
@@ -76,6 +78,9 @@ absl::Status ReadXyz(ByteSource* source, PointCollector* points) {
       const auto header = CsvHeader(*source, content);
       if (!header.ok()) return header.status();
       if (header->has_value()) return ReadCsvRows(source, **header, "", points);
+      first_row = std::string(content);
+      content = first_row;
+      if (absl::Status status = CheckFirstRow(source, content); !status.ok()) return status;
     }
     uint64_t count = 0;
     const bool is_complete = declared && found == *declared;

@@ -45,10 +45,9 @@ void PrintReplaced(const Invocation& run, const v1::ReplaceHullResponse& respons
   table.Print(run.out);
 }
 
-absl::Status NoPoints(const ReplaceArguments& arguments) {
+absl::Status NoPoints(const std::string& files) {
   return absl::InvalidArgumentError(absl::StrCat(
-      "no points in ", absl::StrJoin(arguments.input.files, ", "),
-      "; nothing was changed; pass --allow-empty to make ", arguments.hull_id, " empty"));
+      "no points in ", files, "; nothing was changed; pass --allow-empty to accept this"));
 }
 
 ExitCode Replace(const Invocation& run, const ReplaceArguments& arguments) {
@@ -67,6 +66,7 @@ ExitCode Replace(const Invocation& run, const ReplaceArguments& arguments) {
     uint64_t bytes_before = 0;
     uint64_t points = 0;
     for (ReadRequest& request : *plan) {
+      request.options.allow_empty = true;
       uint64_t file_bytes = 0;
       absl::Status stream;
       request.progress = [&](uint64_t bytes) {
@@ -81,11 +81,16 @@ ExitCode Replace(const Invocation& run, const ReplaceArguments& arguments) {
       bytes_before += file_bytes;
       if (!stream.ok()) return stream;
       if (!counts.ok()) return file_error = counts.status();
+      if (counts->is_empty() && !arguments.allow_empty) {
+        return file_error = NoPoints(request.path);
+      }
       skipped.skipped += counts->skipped;
       skipped.zeros += counts->zeros;
     }
     // The writer of a pipe may have failed: replacing a hull with an empty one needs --allow-empty.
-    if (points == 0 && !arguments.allow_empty) file_error = NoPoints(arguments);
+    if (points == 0 && !arguments.allow_empty) {
+      file_error = NoPoints(absl::StrJoin(arguments.input.files, ", "));
+    }
     return file_error;
   };
   const auto response = run.MakeClient().ReplaceHull(open, feed, run.given_timeout);

@@ -34,9 +34,7 @@ absl::Status ReadDistinctPoints(const ReadRequest& request, v1::PointBlock* poin
     const absl::Status added = add(block.xyz);
     return added.ok() ? add(block.xyz_float) : added;
   };
-  const absl::Status read = ReadPoints(request, receive).status();
-  if (!read.ok() || !points->xyz().empty()) return read;
-  return absl::InvalidArgumentError(absl::StrCat(request.path, ": the file contains no points"));
+  return ReadPoints(request, receive).status();
 }
 
 using Feed = std::function<absl::Status(const Client::PointSink& sink)>;

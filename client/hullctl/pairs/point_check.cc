@@ -49,10 +49,6 @@ class PointCheck {
     bar_.Clear();
     if (!answered_.ok()) return run_.Fail(answered_);
     if (!read.ok()) return run_.FailUsage(read.status());
-    if (read->points == 0) {
-      return run_.FailUsage(
-          absl::InvalidArgumentError(absl::StrCat(file.path, ": the file contains no points")));
-    }
     if (!run_.json() && !run_.names()) PrintTotals();
     if (failed_ == 0) return ExitCode::kDone;
     run_.err << "hullctl: " << Counted(failed_, "point") << " failed; each line gives the reason\n";

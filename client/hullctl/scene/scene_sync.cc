@@ -30,8 +30,7 @@ absl::StatusOr<std::vector<double>> ReadFile(const HullDefinition& hull) {
     return absl::OkStatus();
   });
   if (!counts.ok()) return counts.status();
-  if (!xyz.empty()) return xyz;
-  return absl::InvalidArgumentError(absl::StrCat(hull.file, ": contains no points"));
+  return xyz;
 }
 
 std::array<uint64_t, 7> BitsOf(const v1::Pose& pose) {

@@ -140,6 +140,19 @@ TEST(PlyFile, BinaryErrorsNameTheByte) {
   EXPECT_EQ(read.counts.skipped, 1u);
 }
 
+TEST(PlyFile, BinaryElementsBeyondTheDeclaredCountAreErrors) {
+  Packer body;
+  for (const float value : {1.0f, 2.0f, 3.0f, 4.0f, 5.0f, 6.0f}) body.Add(value);
+  const std::string text = PlyHead("binary_little_endian", kFloatVertices) + body.data();
+  EXPECT_EQ(ReadText(text + body.data(), PointFormat::kPly).error(),
+            "FILE: byte " + std::to_string(text.size()) +
+                ": 24 bytes follow the last element that the header declares; correct its count, "
+                "or cut the file here");
+  for (const std::string& padding : {std::string("\n"), std::string(100, '\0')}) {
+    EXPECT_EQ(ReadText(text + padding, PointFormat::kPly).counts.points, 2u);
+  }
+}
+
 TEST(PcdFile, BinaryFloatsStayFloatsWithOtherFieldsBetween) {
   Packer body;
   for (const float base : {0.0f, 10.0f}) {

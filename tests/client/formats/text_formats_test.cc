@@ -235,6 +235,68 @@ TEST(CsvFile, AHeaderMayNameColumnsLikeNumbers) {
   EXPECT_THAT(ReadText("x,y,z,0\n1,2,3,9\n", PointFormat::kCsv).xyz(), ElementsAre(1, 2, 3));
 }
 
+// The numbers of the columns were read as the point (0, 1, 2).
+TEST(CsvFile, AHeaderThatMayBeAPointIsAnError) {
+  for (const char* text : {"0,1,2\n0.5,1.5,2.5\n", "0,1,2,3\n5,6,7,0.5\n", "0 1 2\n\n1.0 2 3\n",
+                           "\"0\";\"1\";\"2\"\n1e3;2;3\n", "# saved\n0\t1\t2\nnan\t2\t3\n"}) {
+    for (const PointFormat format : {PointFormat::kXyz, PointFormat::kCsv}) {
+      // Quotes occur only in CSV.
+      if (format == PointFormat::kXyz && text[0] == '"') continue;
+      EXPECT_THAT(ReadText(text, format).error(),
+                  HasSubstr("may be a point, or a header that numbers the columns, as pandas"))
+          << text;
+    }
+  }
+  EXPECT_EQ(ReadText("0,1,2\n0.5,1.5,2.5\n", PointFormat::kCsv).error(),
+            "FILE:1: \"0,1,2\" may be a point, or a header that numbers the columns, as pandas "
+            "writes it; replace a header by x,y,z; put x,y,z above a point");
+}
+
+TEST(CsvFile, ARowOfNumbersThatIsNoHeaderIsAPoint) {
+  for (const PointFormat format : {PointFormat::kXyz, PointFormat::kCsv}) {
+    EXPECT_THAT(ReadText("0,1,2\n3,-4,5\n", format).xyz(), ElementsAre(0, 1, 2, 3, -4, 5));
+    EXPECT_THAT(ReadText("0,1,2", format).xyz(), ElementsAre(0, 1, 2));
+    EXPECT_THAT(ReadText("0,1,2\n# 0.5\n0.5,1,2\n", format).xyz(), ElementsAre(0, 1, 2, 0.5, 1, 2));
+    EXPECT_THAT(ReadText("0,1.0,2\n3.5,4,5\n", format).xyz(), ElementsAre(0, 1, 2, 3.5, 4, 5));
+    EXPECT_THAT(ReadText("1,2,3\n3.5,4,5\n", format).xyz(), ElementsAre(1, 2, 3, 3.5, 4, 5));
+    EXPECT_THAT(ReadText("x,y,z\n0,1,2\n0.5,1,2\n", format).xyz(), ElementsAre(0, 1, 2, 0.5, 1, 2));
+  }
+}
+
+// pandas leaves the name of the index empty.
+TEST(CsvFile, AHeaderMayNumberTheColumnsAfterAnIndex) {
+  for (const PointFormat format : {PointFormat::kXyz, PointFormat::kCsv}) {
+    EXPECT_THAT(ReadText(",0,1,2\n0,1.5,2,3\n1,4,5,6\n", format).xyz(),
+                ElementsAre(1.5, 2, 3, 4, 5, 6));
+  }
+}
+
+TEST(CsvFile, NamesMayHaveAUnitOrAPath) {
+  for (const char* text :
+       {"X [m],Y [m],Z [m]\n1,2,3\n", "id;z(mm);y(mm);x(mm)\n7;3;2;1\n",
+        "X [m] Y [m] Z [m] I\n1 2 3 9\n", "x (m)\ty (m)\tz (m)\n1\t2\t3\n",
+        "\"x[m]\",\"y[m]\",\"z[m]\"\n1,2,3\n",
+        "%time,field.header.seq,field.point.x,field.point.y,field.point.z\n17,0,1,2,3\n",
+        "t,Position.X,Position.Y,Position.Z\n0,1,2,3\n"}) {
+    for (const PointFormat format : {PointFormat::kXyz, PointFormat::kCsv}) {
+      EXPECT_THAT(ReadText(text, format).xyz(), ElementsAre(1, 2, 3)) << text;
+    }
+  }
+  // A plain name decides.
+  EXPECT_THAT(ReadText("x [px],x,y,z,n.x,n.y,n.z\n9,1,2,3,7,7,7\n", PointFormat::kCsv).xyz(),
+              ElementsAre(1, 2, 3));
+  EXPECT_THAT(ReadText("p.x,p.y,p.z,v.x,v.y,v.z\n1,2,3,4,5,6\n", PointFormat::kCsv).error(),
+              HasSubstr("names x in columns 1 and 4"));
+}
+
+TEST(CsvFile, PercentSignsStartComments) {
+  for (const PointFormat format : {PointFormat::kXyz, PointFormat::kCsv}) {
+    EXPECT_THAT(ReadText("% Created by Octave\n%\n1 2 3\n % end\n", format).xyz(),
+                ElementsAre(1, 2, 3));
+    EXPECT_THAT(ReadText("% z y x\n3 2 1\n", format).xyz(), ElementsAre(1, 2, 3));
+  }
+}
+
 TEST(CsvFile, WhiteSpaceSeparatesCellsIfTheFirstRowHasNoOtherSeparator) {
   EXPECT_THAT(ReadText("x y z\n1 2 3\n 4  5 6 \n", PointFormat::kCsv).xyz(),
               ElementsAre(1, 2, 3, 4, 5, 6));
@@ -339,6 +401,19 @@ TEST(PlyFile, AsciiKeepsThePrecisionOfTheText) {
   EXPECT_FALSE(read.all_float());
 }
 
+TEST(PlyFile, NamesOfCoordinatesMayBeUpperCase) {
+  const auto read = [](const std::string& properties) {
+    return ReadText(
+        "ply\nformat ascii 1.0\nelement vertex 1\n" + properties + "end_header\n1 2 3 4\n",
+        PointFormat::kPly);
+  };
+  EXPECT_THAT(read("property int id\nproperty float X\nproperty float Y\nproperty float Z\n").xyz(),
+              ElementsAre(2, 3, 4));
+  EXPECT_THAT(
+      read("property float X\nproperty float x\nproperty float y\nproperty float z\n").error(),
+      HasSubstr("has a coordinate twice"));
+}
+
 TEST(PlyFile, AsciiErrorsNameFileAndLine) {
   EXPECT_EQ(ReadText(std::string(kAsciiPly) + "3 8 9\n", PointFormat::kPly).error(),
             "FILE: ends at byte 311 within the element extra, after 2 of 3 items of a list; is it "
@@ -391,7 +466,7 @@ TEST(PlyFile, AsciiFilesThatContradictTheirHeaderAreErrors) {
               HasSubstr("declares 1 elements \"face\", but no vertex"));
   EXPECT_THAT(error("element vertex 1\nproperty float x\nelement vertex 1\n", "1 1 2 3\n"),
               HasSubstr("declares the element vertex twice"));
-  EXPECT_EQ(error("element vertex 0\n", ""), "");
+  EXPECT_EQ(error("element vertex 0\n", ""), "FILE: contains no points");
 }
 
 TEST(PlyFile, FilesTruncatedWithinTheirFacesAreErrors) {
@@ -412,6 +487,16 @@ TEST(PcdFile, AsciiFindsFieldsByName) {
                PointFormat::kPcd);
   EXPECT_TRUE(read.status.ok()) << read.status;
   EXPECT_THAT(read.xyz(), ElementsAre(0.1, 2, 3, 4, 5, 6));
+}
+
+TEST(PcdFile, NamesOfFieldsMayBeUpperCase) {
+  const auto read = [](const std::string& fields) {
+    return ReadText(
+        "FIELDS " + fields + "\nSIZE 4 4 4 4\nTYPE F F F F\nPOINTS 1\nDATA ascii\n" + "1 2 3 4\n",
+        PointFormat::kPcd);
+  };
+  EXPECT_THAT(read("I X Y Z").xyz(), ElementsAre(2, 3, 4));
+  EXPECT_THAT(read("x X y z").error(), HasSubstr("must occur once"));
 }
 
 TEST(PcdFile, AsciiErrorsNameFileAndLine) {
@@ -456,12 +541,51 @@ TEST(Formats, CompressedAndUtf16FilesAreRefusedAsSuch) {
   }
 }
 
-TEST(Formats, EmptyFilesOfHeaderlessFormatsHaveNoPoints) {
-  for (const PointFormat format : {PointFormat::kXyz, PointFormat::kCsv}) {
-    const PointsRead read = ReadText("", format);
+// Formerly, only formats with a header refused such files.
+TEST(Formats, FilesWithoutAPointAreErrors) {
+  const std::pair<PointFormat, std::string> files[] = {
+      {PointFormat::kXyz, ""},
+      {PointFormat::kXyz, "# x y z\n\n0\n"},
+      {PointFormat::kCsv, ""},
+      {PointFormat::kCsv, "x,y,z\n"},
+      {PointFormat::kOff, "OFF\n0 0 0\n"},
+      {PointFormat::kPcd, "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nPOINTS 0\nDATA ascii\n"}};
+  for (const auto& [format, text] : files) {
+    EXPECT_EQ(ReadText(text, format).error(), "FILE: contains no points") << text;
+    ReadOptions options;
+    options.allow_empty = true;
+    const PointsRead read = ReadText(text, format, options);
     EXPECT_TRUE(read.status.ok()) << read.status;
     EXPECT_THAT(read.blocks, IsEmpty());
   }
+}
+
+TEST(Formats, ExponentsOfFortranAreRead) {
+  const std::string row = "1.5D+03 -.5d-1 2.D0";
+  const std::string ply =
+      "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
+      "property float z\nend_header\n";
+  const std::string pcd = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nPOINTS 1\nDATA ascii\n";
+  const std::pair<PointFormat, std::string> files[] = {{PointFormat::kXyz, row},
+                                                       {PointFormat::kXyz, "1.5D+03, -.5d-1;2.D0"},
+                                                       {PointFormat::kCsv, "x y z\n" + row},
+                                                       {PointFormat::kCsv, "1.5D+03,-.5d-1,2.D0"},
+                                                       {PointFormat::kObj, "v " + row},
+                                                       {PointFormat::kOff, "OFF 1 0 0\n" + row},
+                                                       {PointFormat::kPly, ply + row},
+                                                       {PointFormat::kPcd, pcd + row}};
+  for (const auto& [format, text] : files) {
+    EXPECT_THAT(ReadText(text, format).xyz(), ElementsAre(1500, -0.05, 2)) << text;
+    ReadOptions options;
+    options.scale.fill(*LengthScale::FromText("0.001"));
+    EXPECT_THAT(ReadText(text, format, options).xyz(), ElementsAre(1.5, -5e-5, 0.002)) << text;
+  }
+  for (const char* text : {"D5 0 0", "1D 0 0", "1D2D3 0 0", "1DE2 0 0", "nan(d) 0 0"}) {
+    EXPECT_THAT(ReadText(text, PointFormat::kXyz).error(), HasSubstr("is not a number")) << text;
+  }
+  EXPECT_THAT(ReadText("1D999 0 0", PointFormat::kXyz).error(), HasSubstr("the largest double"));
+  const TempFile mesh("a.obj", "v " + row + "\n");
+  EXPECT_THAT(ReadMesh(mesh.path())->vertices[0], ElementsAre(1500, -0.05, 2));
 }
 
 }  // namespace text_formats_test

@@ -88,6 +88,13 @@ TEST(TextNumber, ReadsTheSpellingsOfOldWindowsLibraries) {
   }
 }
 
+TEST(TextNumber, OnlyCoordinatesHaveExponentsOfFortran) {
+  double value = 0;
+  EXPECT_EQ(ParseCoordinate("-1.25D-02", &value), NumberText::kNumber);
+  EXPECT_EQ(value, -0.0125);
+  EXPECT_EQ(KindOf("-1.25D-02"), NumberText::kNoNumber);
+}
+
 TEST(TextNumber, CommentsDoNotStartWithinNumbers) {
   EXPECT_EQ(WithoutComment("1 2 3#c"), "1 2 3");
   EXPECT_EQ(WithoutComment("1 2 1.#INF # 4"), "1 2 1.#INF ");

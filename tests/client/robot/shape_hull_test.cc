@@ -92,6 +92,8 @@ TEST(ShapeHull, MeshIsScaled) {
   EXPECT_THAT(MeshHull(mesh, file.path()).status().ToString(), HasSubstr("exceeds the largest"));
   const TempFile empty("b.obj", "# nothing\n");
   EXPECT_THAT(MeshHull(mesh, empty.path()).status().ToString(), HasSubstr("contains no vertices"));
+  const TempFile cloud("b.xyz", "# nothing\n");
+  EXPECT_THAT(MeshHull(mesh, cloud.path()).status().ToString(), HasSubstr("contains no points"));
   EXPECT_THAT(MeshHull(mesh, "a.3mf").status().ToString(), HasSubstr("convert it"));
 }
 

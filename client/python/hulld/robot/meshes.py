@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import pathlib
+import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -23,6 +24,7 @@ _MAX_CONVEX_VERTICES = 4096
 _RELATIVE_TOLERANCE = 1e-3
 _TRIANGLES_AT_ONCE = 256
 _BYTES_TO_CLASSIFY = 1024
+_FORTRAN_EXPONENT = re.compile(r"(?<=[0-9.])[dD]")
 _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
@@ -136,8 +138,10 @@ def _scaled(values: Points, factor: Fraction) -> Points:
 
 def _number(word: str, factor: Fraction, place: str) -> float:
     """The double nearest to a decimal number times the factor. ValueError: not a finite number."""
+    # Fortran writes 1.0D+03.
+    decimal = _FORTRAN_EXPONENT.sub("E", word)
     try:
-        value = float(word) if factor == 1 else float(Fraction(word) * factor)
+        value = float(decimal) if factor == 1 else float(Fraction(decimal) * factor)
         if not set("_/") & set(word) and abs(value) < float("inf"):
             return value
     except (ValueError, OverflowError, ZeroDivisionError):

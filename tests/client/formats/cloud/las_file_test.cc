@@ -134,7 +134,45 @@ TEST(LasFile, FilesWithMissingPointsAreErrors) {
   // An interrupted writer leaves the count at 0.
   std::string none = text;
   std::memset(none.data() + 107, 0, 4);
-  EXPECT_THAT(ReadText(none, PointFormat::kLas).error(), HasSubstr("declares no points, but more"));
+  EXPECT_THAT(ReadText(none, PointFormat::kLas).error(),
+              HasSubstr("40 bytes follow the 0 points that the header declares"));
+}
+
+TEST(LasFile, RecordsBeyondTheDeclaredCountAreErrors) {
+  for (const int minor : {2, 3, 4}) {
+    LasText las;
+    las.minor = minor;
+    las.xyz = {100, 200, 3000, 4, 5, 6};
+    const std::string text = las.Text();
+    const std::string record(20, 'r');
+    EXPECT_EQ(ReadText(text + record + record, PointFormat::kLas).error(),
+              "FILE: byte " + std::to_string(text.size()) +
+                  ": 40 bytes follow the 2 points that the header declares; correct its count, or "
+                  "cut the file here");
+    for (const std::string& padding : {std::string("\r\n"), std::string(512, '\0')}) {
+      EXPECT_EQ(ReadText(text + padding, PointFormat::kLas).counts.points, 2u);
+    }
+  }
+}
+
+// Waveforms of LAS 1.3, and extended records of LAS 1.4.
+TEST(LasFile, OtherRecordsMayFollowThePoints) {
+  for (const int minor : {3, 4}) {
+    LasText las;
+    las.minor = minor;
+    las.xyz = {100, 200, 3000, 4, 5, 6};
+    const size_t field = minor == 3 ? 227 : 235;
+    for (const size_t gap : {0, 19, 20}) {
+      std::string text = las.Text() + std::string(gap, 'r');
+      const uint64_t start = text.size();
+      std::memcpy(text.data() + field, &start, sizeof(start));
+      if (minor == 4) text[243] = 1;
+      text += std::string(100, 'e');
+      EXPECT_EQ(ReadText(text, PointFormat::kLas).status.ok(), gap < 20) << gap;
+      if (gap < 20) continue;
+      EXPECT_THAT(ReadText(text, PointFormat::kLas).error(), HasSubstr(": 20 bytes follow the 2"));
+    }
+  }
 }
 
 // A field of 0 says nothing about the number of points.

@@ -113,7 +113,24 @@ TEST(CompressedPcd, SizesAreCheckedAgainstTheData) {
               HasSubstr("8 compressed bytes cannot hold 4294967295"));
   EXPECT_THAT(error(head + Packed<uint32_t>({0xffffffff, 24}) + "1234"),
               HasSubstr("within 4294967295 bytes of compressed data"));
-  EXPECT_EQ(error(Head(kFloats, 0) + Packed<uint32_t>({0, 0})), "");
+  EXPECT_EQ(error(Head(kFloats, 0) + Packed<uint32_t>({0, 0})), "FILE: contains no points");
+}
+
+TEST(PcdFile, RowsBeyondTheDeclaredCountAreErrors) {
+  const std::string row = Packed<float>({1, 2, 3});
+  const std::string binary =
+      "FIELDS X Y Z\nSIZE 4 4 4\nTYPE F F F\nPOINTS 2\nDATA binary\n" + row + row;
+  const std::string compressed = Head(kFloats, 2) + Compressed(Packed<float>({1, 1, 2, 2, 3, 3}));
+  for (const std::string& text : {binary, compressed}) {
+    EXPECT_EQ(ReadText(text + row + row, PointFormat::kPcd).error(),
+              "FILE: byte " + std::to_string(text.size()) +
+                  ": 24 bytes follow the 2 points that the header declares; correct its count, or "
+                  "cut the file here");
+    // Padding: less than a row, or zeros, as PCL once wrote them.
+    for (const std::string& padding : {std::string("\n"), std::string(4096, '\0')}) {
+      EXPECT_THAT(ReadText(text + padding, PointFormat::kPcd).xyz(), ElementsAre(1, 2, 3, 1, 2, 3));
+    }
+  }
 }
 
 TEST(PcdFile, HeadersThatContradictTheirDataAreErrors) {
@@ -126,7 +143,7 @@ TEST(PcdFile, HeadersThatContradictTheirDataAreErrors) {
   EXPECT_EQ(error("POINTS 1\nDATA ascii\n1 2 3\n\n4 5 6\n"),
             "FILE:8: the file has more rows than the 1 POINTS of its header");
   EXPECT_THAT(error("POINTS 0\nDATA binary\n123456789012"),
-              HasSubstr("declares no points, but data follows"));
+              HasSubstr("12 bytes follow the 0 points that the header declares"));
   EXPECT_THAT(error("POINTS 1\nDATA zip\n"), HasSubstr("binary and binary_compressed"));
 }
 

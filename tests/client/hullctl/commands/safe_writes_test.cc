@@ -32,6 +32,12 @@ TEST_F(SafeWrites, ReplacingWithNoPointsMustBeExplicit) {
   }
   EXPECT_EQ(Ask({"replace", "new", empty.path(), "--create"}).code, 2);
   EXPECT_FALSE(Exists("new"));
+  const TempFile good("good.xyz", "9 9 9\n");
+  EXPECT_THAT(Ask({"replace", "h", good.path(), empty.path()}).err,
+              HasSubstr("no points in " + empty.path() + ";"));
+  EXPECT_EQ(Get("h").hull().vertex_count(), 8U);
+  EXPECT_EQ(Ask({"replace", "h", good.path(), empty.path(), "--allow-empty"}).code, 0);
+  EXPECT_EQ(Get("h").hull().vertex_count(), 1U);
   EXPECT_EQ(Ask({"replace", "h", empty.path(), "--allow-empty"}).code, 0);
   EXPECT_EQ(Get("h").hull().vertex_count(), 0U);
 }
@@ -55,15 +61,33 @@ TEST_F(SafeWrites, AppendNamesDirectoriesAndMissingFilesOfAnyExtension) {
               HasSubstr("cannot open /no/such/file: No such file"));
 }
 
-TEST_F(SafeWrites, AppendCreatesNoHullFromNoPoints) {
-  const TempFile empty("empty.xyz", "# nothing\n");
-  const Ran ran = Ask({"append", "new", empty.path(), "--create"});
+TEST_F(SafeWrites, AppendRefusesAFileWithoutPoints) {
+  Put("h", server::Cube());
+  const TempFile good("good.xyz", "9 9 9\n");
+  for (const char* name : {"empty.xyz", "empty.csv"}) {
+    const TempFile empty(name, "# nothing\n");
+    const std::string error = "hullctl: " + empty.path() + ": contains no points\n";
+    Ran ran = Ask({"append", "new", empty.path(), "--create"});
+    EXPECT_EQ(ran.code, 2);
+    EXPECT_EQ(ran.err, error);
+    EXPECT_FALSE(Exists("new"));
+    ran = Ask({"append", "h", empty.path()});
+    EXPECT_EQ(ran.code, 2);
+    EXPECT_EQ(ran.err, error);
+    ran = Ask({"append", "h", good.path(), empty.path()});
+    EXPECT_EQ(ran.code, 2);
+    EXPECT_THAT(ran.err, AllOf(HasSubstr("appended 1 point before"), HasSubstr(error)));
+  }
+}
+
+TEST_F(SafeWrites, AppendCreatesNoHullFromSkippedPoints) {
+  const TempFile holes("holes.xyz", "0 0 0\n");
+  const Ran ran = Ask({"append", "new", holes.path(), "--create", "--skip-zero"});
   EXPECT_EQ(ran.code, 2);
   EXPECT_THAT(ran.err, AllOf(HasSubstr("contain no points"), HasSubstr("hullctl create")));
   EXPECT_FALSE(Exists("new"));
-  // Appending no points to an existing hull is allowed.
   Put("h", server::Cube());
-  EXPECT_EQ(Ask({"append", "h", empty.path(), "--create"}).code, 0);
+  EXPECT_EQ(Ask({"append", "h", holes.path(), "--skip-zero"}).code, 0);
 }
 
 TEST_F(SafeWrites, AppendRemovesTheHullThatItCreatedWhenTheServerRefusesItsPoints) {

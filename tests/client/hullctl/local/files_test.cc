@@ -145,8 +145,7 @@ TEST_F(Files, AreNamedInErrors) {
   EXPECT_THAT(Ask({"check", "./part", "./part"}).err, HasSubstr("./part"));
   EXPECT_THAT(Ask({"check", (folder_ / "none.stl").string(), "a"}).err, HasSubstr("none.stl"));
   const std::string empty = Write("empty.xyz", {});
-  EXPECT_THAT(Ask({"check", empty, empty}).err,
-              HasSubstr("empty.xyz: the file contains no points"));
+  EXPECT_THAT(Ask({"check", empty, empty}).err, HasSubstr("empty.xyz: contains no points"));
   // A name without a matching file is an ID.
   EXPECT_THAT(Ask({"check", "part.stl", "part.stl"}).err, HasSubstr("part.stl"));
 }

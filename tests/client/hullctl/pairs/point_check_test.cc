@@ -80,7 +80,7 @@ TEST_F(PointCheck, ErrorsNameTheDefect) {
   usage({"check", "cube", "--points", points, "--verify"}, "remove --verify");
   usage({"check", "cube", "--points", points, "--tolerance", "1"}, "remove --tolerance");
   usage({"check", "cube"}, "B is required");
-  usage({"check", "cube", "--points", Write("empty.xyz", "")}, "the file contains no points");
+  usage({"check", "cube", "--points", Write("empty.xyz", "")}, "empty.xyz: contains no points");
   usage({"check", "cube", "--points", Write("nan.xyz", "0 nan 0\n")}, "nan.xyz:1");
   usage({"check", "cube", "--points", "none.xyz"}, "none.xyz");
 }

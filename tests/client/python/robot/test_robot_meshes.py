@@ -102,10 +102,12 @@ def test_obj_is_read(tmp_path: pathlib.Path) -> None:
         "v 0 2 0 0.5 0.5 0.5\nf -3//1 -2/1 -1/1/1 # a face\n"
     )
     assert points_of(tmp_path / "a.obj", text).tolist() == [[0, 0, 0], [1, 0, 0], [0, 2, 0]]
+    assert points_of(tmp_path / "a.obj", "v 1.5D+03 -.5d-1 2.D0\n").tolist() == [[1500, -0.05, 2]]
     for bad, message in (
         ("", "contains no vertices"),
         ("v 0 0\n", "1: a vertex has 2 of 3 coordinates"),
         ("v 0 0 nan\n", "1: 'nan' is not a finite number"),
+        ("v 0 0 D5\n", "1: 'D5' is not a finite number"),
         ("v 0 0 0\nf 1 1 2\n", "2: a face names vertex 2, but the file has 1"),
         ("v 0 0 0\nf 1 0 1\n", "2: '0' is not a vertex"),
         ("v 0 0 0\nf -2 1 1\n", "2: '-2' is not a vertex; 1 precede this line"),
