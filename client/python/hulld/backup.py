@@ -8,7 +8,6 @@ import pathlib
 import struct
 import zlib
 from dataclasses import dataclass
-from types import TracebackType
 
 from hulld.answers.hulls import Header, header_of
 from hulld.connection import PathLike
@@ -82,12 +81,7 @@ class BackupWriter:
     def __enter__(self) -> BackupWriter:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._file.close()
         with contextlib.suppress(FileNotFoundError):
             self._partial.unlink()

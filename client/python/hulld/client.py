@@ -284,14 +284,9 @@ class Client(ClientBase):
     ) -> Iterator[HullInfo]:
         """The hulls with the ID prefix `prefix`, in byte order of their IDs, fetched page by page.
         A hull that exists throughout appears exactly once. `timeout` applies to each page."""
-        token = ""
-        while True:
-            page = self._unary(requests.list_hulls(prefix, page_size, token), timeout, freshness)
-            yield from page.hulls
-            token = page.next_page
-            freshness = freshness and freshness.for_next_page(page.header)
-            if not token:
-                return
+        return self._items(
+            lambda token: requests.list_hulls(prefix, page_size, token), timeout, freshness
+        )
 
     def delete_hull(
         self, hull_id: str, *, if_revision: int | None = None, timeout: float | None = None
@@ -363,14 +358,9 @@ class Client(ClientBase):
     ) -> Iterator[BodyInfo]:
         """The bodies with the ID prefix `prefix`, without their pieces; otherwise as
         list_hulls."""
-        token = ""
-        while True:
-            page = self._unary(requests.list_bodies(prefix, page_size, token), timeout, freshness)
-            yield from page.bodies
-            token = page.next_page
-            freshness = freshness and freshness.for_next_page(page.header)
-            if not token:
-                return
+        return self._items(
+            lambda token: requests.list_bodies(prefix, page_size, token), timeout, freshness
+        )
 
     def delete_body(
         self, body_id: str, *, if_revision: int | None = None, timeout: float | None = None

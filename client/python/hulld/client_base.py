@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from types import TracebackType
 from typing import Any, Protocol, Self, TypeVar
 
 from hulld import arguments
 from hulld.calls.attempts import Attempts
 from hulld.calls.channel import Channel
 from hulld.calls.freshness import Freshness
-from hulld.calls.requests import Call, as_fresh
+from hulld.calls.requests import Call, Page, as_fresh
 from hulld.calls.transport import cancel_call, close_channel, invoke, open_channel, read, sleep
 from hulld.connection import DEFAULT_SERVER, Connection, Tls
 from hulld.errors import HulldError, read_answer
@@ -70,12 +69,7 @@ class ClientBase:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def __repr__(self) -> str:
@@ -100,6 +94,22 @@ class ClientBase:
                 return read_answer(call.decode, answer)
             except HulldError as error:
                 sleep(attempts.wait_after(error))
+
+    def _items(
+        self,
+        page_at: Callable[[str], Call[Page[T]]],
+        timeout: float | None,
+        freshness: Freshness | None,
+    ) -> Iterator[T]:
+        """The items of a list, page by page. page_at: the call for a page token."""
+        token = ""
+        while True:
+            page = self._unary(page_at(token), timeout, freshness)
+            yield from page.items
+            token = page.next_page
+            freshness = freshness and freshness.for_next_page(page.header)
+            if not token:
+                return
 
     def _parts(
         self, call: Call[T], timeout: float | None, freshness: Freshness | None = None

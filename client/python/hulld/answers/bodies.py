@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -49,16 +48,7 @@ class ReplacedBody:
     header: Header
 
 
-@dataclass(frozen=True)
-class BodyPage:
-    """One page of a list; next_page: empty on the last page."""
-
-    bodies: Sequence[BodyInfo]
-    next_page: str
-    header: Header
-
-
-def _info_of(message: Any) -> BodyInfo:
+def info_of(message: Any) -> BodyInfo:
     return BodyInfo(
         message.body_id,
         message.create_revision,
@@ -71,7 +61,7 @@ def _info_of(message: Any) -> BodyInfo:
 def decode_replaced(data: bytes) -> ReplacedBody:
     message = body_pb2.PutBodyResponse.FromString(data)
     return ReplacedBody(
-        _info_of(message.body),
+        info_of(message.body),
         message.created,
         enum_or_zero(Durability, message.durability),
         header_of(message.header),
@@ -92,17 +82,8 @@ def decode_body(data: bytes) -> Body:
         poses[row, 4:] = (t.x, t.y, t.z)
         radii[row] = piece.radius
     return Body(
-        _info_of(message.body),
+        info_of(message.body),
         Placements(list(places), poses, indices, radii=radii),
-        header_of(message.header),
-    )
-
-
-def decode_page(data: bytes) -> BodyPage:
-    message = body_pb2.ListBodiesResponse.FromString(data)
-    return BodyPage(
-        [_info_of(body) for body in message.bodies],
-        message.next_page_token,
         header_of(message.header),
     )
 

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from hulld import arguments
 from hulld.answers import bodies, collision_messages, hulls, status
-from hulld.answers.bodies import Body, BodyPage, ReplacedBody
+from hulld.answers.bodies import Body, BodyInfo, ReplacedBody
 from hulld.answers.collisions import BatchPart, Collision, Method, ScenePart
 from hulld.answers.hulls import CreatedHull, Header, Hull, HullChanges, HullInfo, MeshPart
 from hulld.answers.status import ServerStatus
@@ -59,6 +59,15 @@ def is_serving(answer: bytes) -> bool:
     return answer == b"\x08\x01"
 
 
+def _call(
+    service: str, name: str, request: Any, decode: Callable[[bytes], T], safe_to_repeat: bool
+) -> Call[T]:
+    """request: a message of the contract, or a MessageWriter."""
+    is_writer = isinstance(request, MessageWriter)
+    data = request.finish() if is_writer else request.SerializeToString()
+    return Call(method_path(service, name), data, decode, safe_to_repeat)
+
+
 def check_health() -> Call[bool]:
     return Call(CHECK_HEALTH, b"", is_serving, False)
 
@@ -78,12 +87,7 @@ def _freshness_field(freshness: Freshness) -> bytes:
 
 def create_hull(hull_id: str, if_absent: bool) -> Call[CreatedHull]:
     request = hull_pb2.CreateHullRequest(hull_id=arguments.hull_id(hull_id), if_absent=if_absent)
-    return Call(
-        method_path("HullService", "CreateHull"),
-        request.SerializeToString(),
-        hulls.decode_created,
-        if_absent,
-    )
+    return _call("HullService", "CreateHull", request, hulls.decode_created, if_absent)
 
 
 def get_hull(
@@ -95,9 +99,10 @@ def get_hull(
         without_facets=not facets,
         properties=properties,
     )
-    return Call(
-        method_path("HullService", "GetHull"),
-        request.SerializeToString(),
+    return _call(
+        "HullService",
+        "GetHull",
+        request,
         lambda data: hulls.decode_hull(data, facets, viewer),
         True,
     )
@@ -128,40 +133,38 @@ def get_hull_mesh(
             arguments.optional_count(max_vertices, "max_vertices", least=1) or 0
         )
         request.simplification.max_error = arguments.optional_length(max_error, "max_error") or 0.0
-    return Call(
-        method_path("HullService", "GetHullMesh"),
-        request.SerializeToString(),
-        hulls.decode_mesh_part,
-        True,
-    )
+    return _call("HullService", "GetHullMesh", request, hulls.decode_mesh_part, True)
 
 
 @dataclass(frozen=True)
-class HullPage:
+class Page(Generic[T]):
     """One page of a list; next_page: empty on the last."""
 
-    hulls: Sequence[HullInfo]
+    items: Sequence[T]
     next_page: str
     header: Header
 
 
-def list_hulls(prefix: str, page_size: int, page_token: str) -> Call[HullPage]:
-    def decode(data: bytes) -> HullPage:
-        message = hull_pb2.ListHullsResponse.FromString(data)
-        if message.next_page_token and message.next_page_token == page_token:
-            raise ValueError("the server returned the same page token twice")
-        return HullPage(
-            [hulls.info_of(hull) for hull in message.hulls],
-            message.next_page_token,
-            hulls.header_of(message.header),
-        )
+def _page_of(items: Sequence[T], message: Any, page_token: str) -> Page[T]:
+    if message.next_page_token and message.next_page_token == page_token:
+        raise ValueError("the server returned the same page token twice")
+    return Page(items, message.next_page_token, hulls.header_of(message.header))
 
-    request = hull_pb2.ListHullsRequest(
-        prefix=arguments.text(prefix, "prefix"),
-        page_size=arguments.count(page_size, "page_size"),
-        page_token=page_token,
-    )
-    return Call(method_path("HullService", "ListHulls"), request.SerializeToString(), decode, True)
+
+def _choose_page(request: Any, prefix: str, page_size: int, page_token: str) -> None:
+    request.prefix = arguments.text(prefix, "prefix")
+    request.page_size = arguments.count(page_size, "page_size")
+    request.page_token = page_token
+
+
+def list_hulls(prefix: str, page_size: int, page_token: str) -> Call[Page[HullInfo]]:
+    def decode(data: bytes) -> Page[HullInfo]:
+        message = hull_pb2.ListHullsResponse.FromString(data)
+        return _page_of([hulls.info_of(hull) for hull in message.hulls], message, page_token)
+
+    request = hull_pb2.ListHullsRequest()
+    _choose_page(request, prefix, page_size, page_token)
+    return _call("HullService", "ListHulls", request, decode, True)
 
 
 def delete_hull(hull_id: str, if_revision: int | None) -> Call[Header]:
@@ -172,9 +175,7 @@ def delete_hull(hull_id: str, if_revision: int | None) -> Call[Header]:
         hull_id=arguments.hull_id(hull_id), if_revision=arguments.revision(if_revision)
     )
     # A repeated delete could remove a new hull of the same ID.
-    return Call(
-        method_path("HullService", "DeleteHull"), request.SerializeToString(), decode, False
-    )
+    return _call("HullService", "DeleteHull", request, decode, False)
 
 
 def _put_pose(target: Any, numbers: npt.NDArray[np.float64]) -> None:
@@ -208,46 +209,29 @@ def put_body(body_id: str, pieces: Placements, if_revision: int | None) -> Call[
     for index in range(len(pieces)):
         _put_placement(request.pieces.add(), pieces, index)
     # Putting the same pieces twice is idempotent, unless it depends on the revision.
-    return Call(
-        method_path("BodyService", "PutBody"),
-        request.SerializeToString(),
-        bodies.decode_replaced,
-        if_revision is None,
-    )
+    return _call("BodyService", "PutBody", request, bodies.decode_replaced, if_revision is None)
 
 
 def get_body(body_id: str) -> Call[Body]:
     request = body_pb2.GetBodyRequest(body_id=arguments.hull_id(body_id, "body_id"))
-    return Call(
-        method_path("BodyService", "GetBody"), request.SerializeToString(), bodies.decode_body, True
-    )
+    return _call("BodyService", "GetBody", request, bodies.decode_body, True)
 
 
-def list_bodies(prefix: str, page_size: int, page_token: str) -> Call[BodyPage]:
-    def decode(data: bytes) -> BodyPage:
-        page = bodies.decode_page(data)
-        if page.next_page and page.next_page == page_token:
-            raise ValueError("the server returned the same page token twice")
-        return page
+def list_bodies(prefix: str, page_size: int, page_token: str) -> Call[Page[BodyInfo]]:
+    def decode(data: bytes) -> Page[BodyInfo]:
+        message = body_pb2.ListBodiesResponse.FromString(data)
+        return _page_of([bodies.info_of(body) for body in message.bodies], message, page_token)
 
-    request = body_pb2.ListBodiesRequest(
-        prefix=arguments.text(prefix, "prefix"),
-        page_size=arguments.count(page_size, "page_size"),
-        page_token=page_token,
-    )
-    return Call(method_path("BodyService", "ListBodies"), request.SerializeToString(), decode, True)
+    request = body_pb2.ListBodiesRequest()
+    _choose_page(request, prefix, page_size, page_token)
+    return _call("BodyService", "ListBodies", request, decode, True)
 
 
 def delete_body(body_id: str, if_revision: int | None) -> Call[Header]:
     request = body_pb2.DeleteBodyRequest(
         body_id=arguments.hull_id(body_id, "body_id"), if_revision=arguments.revision(if_revision)
     )
-    return Call(
-        method_path("BodyService", "DeleteBody"),
-        request.SerializeToString(),
-        bodies.decode_deleted,
-        False,
-    )
+    return _call("BodyService", "DeleteBody", request, bodies.decode_deleted, False)
 
 
 def watch_hulls(
@@ -260,12 +244,7 @@ def watch_hulls(
         after_revision=after.revision if after else 0,
         store_id=after.store_id if after else "",
     )
-    return Call(
-        method_path("HullService", "WatchHulls"),
-        request.SerializeToString(),
-        hulls.decode_changes,
-        True,
-    )
+    return _call("HullService", "WatchHulls", request, hulls.decode_changes, True)
 
 
 def get_status() -> Call[ServerStatus]:
@@ -286,9 +265,10 @@ def check_collision(
     )
     for index, target in enumerate((request.a, request.b)):
         _put_placement(target, pair, index)
-    return Call(
-        method_path("CollisionService", "CheckCollision"),
-        request.SerializeToString(),
+    return _call(
+        "CollisionService",
+        "CheckCollision",
+        request,
         lambda data: collision_messages.decode_collision(data, pair, viewer),
         True,
     )
@@ -312,9 +292,10 @@ def check_collisions(
         .uint32s(2, pairs)
         .message(6, placements.packed())
     )
-    return Call(
-        method_path("CollisionService", "BatchCheckCollisions"),
-        request.finish(),
+    return _call(
+        "CollisionService",
+        "BatchCheckCollisions",
+        request,
         lambda data: collision_messages.decode_batch_part(data, wanted),
         True,
     )
@@ -379,9 +360,10 @@ def find_collisions(
     )
     scene.put(fixed, len(placements))
     request = MessageWriter().raw(fixed.SerializeToString()).message(8, placements.packed())
-    return Call(
-        method_path("CollisionService", "FindCollisions"),
-        request.finish(),
+    return _call(
+        "CollisionService",
+        "FindCollisions",
+        request,
         lambda data: collision_messages.decode_scene_part(data, wanted),
         True,
     )
