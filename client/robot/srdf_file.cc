@@ -12,19 +12,18 @@
 namespace hulld {
 namespace {
 
-absl::StatusOr<int> LinkOf(const XmlDocument& document, const TiXmlElement& element,
+absl::StatusOr<int> LinkOf(const XmlDocument& document, pugi::xml_node element,
                            const char* attribute, const Robot& robot) {
-  const std::string name = AttributeOf(element, attribute);
+  const std::string name = element.attribute(attribute).value();
   const int link = robot.FindLink(name);
   if (link >= 0) return link;
   return document.ErrorAt(
-      element, name.empty()
-                   ? absl::StrCat("<", element.ValueStr(), "> lacks ", attribute, "=\"...\"")
-                   : absl::StrCat("<", element.ValueStr(), "> names the link ", Quoted(name),
-                                  ", which robot ", Quoted(robot.name), " does not have"));
+      element, name.empty() ? absl::StrCat("<", element.name(), "> lacks ", attribute, "=\"...\"")
+                            : absl::StrCat("<", element.name(), "> names the link ", Quoted(name),
+                                           ", which robot ", Quoted(robot.name), " does not have"));
 }
 
-absl::StatusOr<LinkPair> PairOf(const XmlDocument& document, const TiXmlElement& element,
+absl::StatusOr<LinkPair> PairOf(const XmlDocument& document, pugi::xml_node element,
                                 const Robot& robot) {
   const auto a = LinkOf(document, element, "link1", robot);
   if (!a.ok()) return a.status();
@@ -61,22 +60,22 @@ absl::StatusOr<std::set<LinkPair>> ParseDisabledPairs(const std::string& text,
                                                       const std::string& name, const Robot& robot) {
   const auto document = ParseXml(text, name, "robot");
   if (!document.ok()) return document.status();
-  const TiXmlElement& root = *(*document)->tree.RootElement();
+  const pugi::xml_node root = (*document)->root();
   std::set<LinkPair> pairs;
-  for (const TiXmlElement* element : ChildrenOf(root, "disable_default_collisions")) {
-    const auto link = LinkOf(**document, *element, "link", robot);
+  for (const pugi::xml_node element : root.children("disable_default_collisions")) {
+    const auto link = LinkOf(**document, element, "link", robot);
     if (!link.ok()) return link.status();
     for (int other = 0; other < static_cast<int>(robot.links.size()); ++other) {
       if (other != *link) pairs.insert(MakeLinkPair(*link, other));
     }
   }
-  for (const TiXmlElement* element : ChildrenOf(root, "enable_collisions")) {
-    const auto pair = PairOf(**document, *element, robot);
+  for (const pugi::xml_node element : root.children("enable_collisions")) {
+    const auto pair = PairOf(**document, element, robot);
     if (!pair.ok()) return pair.status();
     pairs.erase(*pair);
   }
-  for (const TiXmlElement* element : ChildrenOf(root, "disable_collisions")) {
-    const auto pair = PairOf(**document, *element, robot);
+  for (const pugi::xml_node element : root.children("disable_collisions")) {
+    const auto pair = PairOf(**document, element, robot);
     if (!pair.ok()) return pair.status();
     pairs.insert(*pair);
   }

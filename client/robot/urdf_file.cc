@@ -1,17 +1,15 @@
 #include "client/robot/urdf_file.h"
 
 #include <absl/strings/str_cat.h>
-#include <console_bridge/console.h>
-#include <urdf_model/model.h>
-#include <urdf_parser/urdf_parser.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <exception>
 #include <map>
-#include <memory>
-#include <set>
+#include <optional>
+#include <span>
 #include <utility>
+#include <vector>
 
 #include "client/formats/byte_source.h"
 #include "client/formats/text_number.h"
@@ -20,236 +18,311 @@
 namespace hulld {
 namespace {
 
-constexpr const char* kShapes[] = {"box", "cylinder", "sphere", "capsule", "mesh"};
-constexpr const char* kJoints[] = {"fixed",     "revolute", "continuous",
-                                   "prismatic", "planar",   "floating"};
+constexpr std::pair<const char*, ShapeKind> kShapes[] = {{"box", ShapeKind::kBox},
+                                                         {"cylinder", ShapeKind::kCylinder},
+                                                         {"sphere", ShapeKind::kSphere},
+                                                         {"capsule", ShapeKind::kCapsule},
+                                                         {"mesh", ShapeKind::kMesh}};
+constexpr std::pair<const char*, JointKind> kJoints[] = {
+    {"fixed", JointKind::kFixed},           {"revolute", JointKind::kRevolute},
+    {"continuous", JointKind::kContinuous}, {"prismatic", JointKind::kPrismatic},
+    {"planar", JointKind::kPlanar},         {"floating", JointKind::kFloating}};
 
-// Captures the first error that liburdfdom logs, in place of its output.
-class FirstError final : public console_bridge::OutputHandler {
- public:
-  FirstError() { console_bridge::useOutputHandler(this); }
-  ~FirstError() override { console_bridge::restorePreviousOutputHandler(); }
-  FirstError(const FirstError&) = delete;
-  FirstError& operator=(const FirstError&) = delete;
-
-  void log(const std::string& text, console_bridge::LogLevel level, const char* /*file*/,
-           int /*line*/) override {
-    if (level >= console_bridge::CONSOLE_BRIDGE_LOG_ERROR && text_.empty()) text_ = text;
+template <typename Kind, size_t n>
+std::optional<Kind> KindOf(const std::pair<const char*, Kind> (&kinds)[n],
+                           const std::string& name) {
+  for (const auto& [known, kind] : kinds) {
+    if (name == known) return kind;
   }
-  const std::string& text() const { return text_; }
+  return std::nullopt;
+}
 
- private:
-  std::string text_;
-};
+// Returns the rotation Rz(yaw) Ry(pitch) Rx(roll), in liburdfdom's order of operations, so that
+// poses agree with it to the last bit.
+RigidPose RotationOfUrdf(double roll, double pitch, double yaw) {
+  const double cr = std::cos(roll / 2);
+  const double sr = std::sin(roll / 2);
+  const double cp = std::cos(pitch / 2);
+  const double sp = std::sin(pitch / 2);
+  const double cy = std::cos(yaw / 2);
+  const double sy = std::sin(yaw / 2);
+  const double x = sr * cp * cy - cr * sp * sy;
+  const double y = cr * sp * cy + sr * cp * sy;
+  const double z = cr * cp * sy - sr * sp * cy;
+  const double w = cr * cp * cy + sr * sp * sy;
+  const double length = std::sqrt(x * x + y * y + z * z + w * w);
+  return {w / length, x / length, y / length, z / length, 0, 0, 0};
+}
 
-// Checks a description before liburdfdom parses it, for defects that the library accepts or reports
-// without a line.
-class UrdfCheck {
+// Reads links and joints by name, and then the tree that they form.
+class UrdfReader {
  public:
-  explicit UrdfCheck(const XmlDocument& document) : document_(document) {}
+  explicit UrdfReader(const XmlDocument& document) : document_(document) {}
 
-  absl::Status Run() {
-    const TiXmlElement& root = *document_.tree.RootElement();
-    if (AttributeOf(root, "name").empty()) {
+  absl::StatusOr<Robot> Run() {
+    const pugi::xml_node root = document_.root();
+    if (std::string_view(root.attribute("name").value()).empty()) {
       return document_.ErrorAt(root, "<robot> lacks name=\"...\"");
     }
-    for (const TiXmlElement* link : ChildrenOf(root, "link")) {
-      if (absl::Status good = TakeLink(*link); !good.ok()) return good;
+    for (const pugi::xml_node link : root.children("link")) {
+      if (absl::Status good = TakeLink(link); !good.ok()) return good;
     }
     if (links_.empty()) return document_.ErrorAt(root, "<robot> has no <link>");
-    const std::vector<const TiXmlElement*> joints = ChildrenOf(root, "joint");
-    for (const TiXmlElement* joint : joints) {
-      if (absl::Status good = TakeJoint(*joint); !good.ok()) return good;
+    for (const pugi::xml_node joint : root.children("joint")) {
+      if (absl::Status good = TakeJoint(joint); !good.ok()) return good;
     }
-    for (const TiXmlElement* joint : joints) {
-      if (absl::Status good = CheckMimic(*joint); !good.ok()) return good;
+    for (auto& [name, joint] : joints_) {
+      if (absl::Status good = TakeMimic(&joint); !good.ok()) return good;
     }
-    return CheckTree();
+    for (const auto& [name, joint] : joints_) {
+      if (absl::Status good = CheckMimicChain(joint); !good.ok()) return good;
+    }
+    const auto top = FindRoot();
+    if (!top.ok()) return top.status();
+    Robot robot = Assemble(*top);
+    robot.name = root.attribute("name").value();
+    return robot;
   }
 
  private:
-  absl::StatusOr<std::string> NameOf(const TiXmlElement& element) const {
-    std::string name = AttributeOf(element, "name");
+  struct Link {
+    pugi::xml_node element;
+    std::vector<CollisionShape> shapes;
+  };
+  struct Joint {
+    pugi::xml_node element;
+    // Without the indices of links and joints.
+    RobotJoint joint;
+    std::string parent;
+    std::string child;
+    // The joint that it mimics; empty for none.
+    std::string leader;
+  };
+
+  absl::StatusOr<std::string> NameOf(pugi::xml_node element) const {
+    const std::string name = element.attribute("name").value();
     if (!name.empty()) return name;
-    return document_.ErrorAt(element,
-                             absl::StrCat("<", element.ValueStr(), "> lacks name=\"...\""));
+    return document_.ErrorAt(element, absl::StrCat("<", element.name(), "> lacks name=\"...\""));
   }
 
-  absl::Status TakeLink(const TiXmlElement& link) {
-    const auto name = NameOf(link);
+  absl::Status DefinedTwice(pugi::xml_node element, pugi::xml_node first) const {
+    return document_.ErrorAt(
+        element, absl::StrCat(element.name(), " ", Quoted(element.attribute("name").value()),
+                              " is defined twice; the first definition is in line ",
+                              document_.LineOf(first)));
+  }
+
+  // Sets `number` to an attribute, if it exists.
+  absl::Status TakeNumber(pugi::xml_node element, const char* attribute, double* number) const {
+    if (!element.attribute(attribute)) return absl::OkStatus();
+    const auto value = NumbersOf(document_, element, attribute, 1);
+    if (value.ok()) *number = value->front();
+    return value.status();
+  }
+
+  absl::Status TakeLink(pugi::xml_node element) {
+    const auto name = NameOf(element);
     if (!name.ok()) return name.status();
-    const auto [other, is_new] = links_.emplace(*name, &link);
-    if (!is_new) {
-      return document_.ErrorAt(link, absl::StrCat("link ", Quoted(*name),
-                                                  " is defined twice; the first definition is in ",
-                                                  "line ", other->second->Row()));
-    }
-    for (const TiXmlElement* collision : ChildrenOf(link, "collision")) {
-      if (absl::Status good = CheckCollision(*collision); !good.ok()) return good;
+    const auto [entry, is_new] = links_.try_emplace(*name);
+    if (!is_new) return DefinedTwice(element, entry->second.element);
+    entry->second.element = element;
+    for (const pugi::xml_node collision : element.children("collision")) {
+      CollisionShape& shape = entry->second.shapes.emplace_back();
+      if (absl::Status good = TakeCollision(collision, &shape); !good.ok()) return good;
     }
     return absl::OkStatus();
   }
 
-  absl::Status CheckOrigin(const TiXmlElement& parent) const {
-    const TiXmlElement* const origin = parent.FirstChildElement("origin");
-    if (origin == nullptr) return absl::OkStatus();
-    for (const char* attribute : {"xyz", "rpy"}) {
-      if (origin->Attribute(attribute) == nullptr) continue;
-      const auto numbers = NumbersOf(document_, *origin, attribute, 3);
-      if (!numbers.ok()) return numbers.status();
+  // Reads the pose of an element; no motion if it has no <origin>.
+  absl::Status TakeOrigin(pugi::xml_node parent, RigidPose* pose) const {
+    const pugi::xml_node origin = parent.child("origin");
+    if (!origin) return absl::OkStatus();
+    if (origin.attribute("rpy")) {
+      const auto rpy = NumbersOf(document_, origin, "rpy", 3);
+      if (!rpy.ok()) return rpy.status();
+      *pose = RotationOfUrdf((*rpy)[0], (*rpy)[1], (*rpy)[2]);
     }
-    return absl::OkStatus();
+    if (!origin.attribute("xyz")) return absl::OkStatus();
+    const auto xyz = NumbersOf(document_, origin, "xyz", 3);
+    if (xyz.ok()) std::copy(xyz->begin(), xyz->end(), pose->begin() + 4);
+    return xyz.status();
   }
 
-  absl::Status CheckCollision(const TiXmlElement& collision) const {
-    if (absl::Status good = CheckOrigin(collision); !good.ok()) return good;
-    const TiXmlElement* const geometry = collision.FirstChildElement("geometry");
-    if (geometry == nullptr) return document_.ErrorAt(collision, "<collision> lacks <geometry>");
-    const TiXmlElement* const shape = geometry->FirstChildElement();
-    const std::string kind = shape == nullptr ? "" : shape->ValueStr();
-    if (std::find(std::begin(kShapes), std::end(kShapes), kind) == std::end(kShapes)) {
+  absl::Status TakeCollision(pugi::xml_node collision, CollisionShape* shape) const {
+    shape->line = document_.LineOf(collision);
+    if (absl::Status good = TakeOrigin(collision, &shape->X_LS); !good.ok()) return good;
+    const pugi::xml_node geometry = collision.child("geometry");
+    if (!geometry) return document_.ErrorAt(collision, "<collision> lacks <geometry>");
+    const pugi::xml_node element = geometry.find_child(
+        [](pugi::xml_node child) { return child.type() == pugi::node_element; });
+    const std::string name = element.name();
+    const std::optional<ShapeKind> kind = KindOf(kShapes, name);
+    if (!kind) {
       return document_.ErrorAt(
-          shape == nullptr ? *geometry : *shape,
-          absl::StrCat("<geometry> contains ", shape == nullptr ? "nothing" : Quoted(kind),
+          element ? element : geometry,
+          absl::StrCat("<geometry> contains ", element ? Quoted(name) : "nothing",
                        "; it must contain a box, cylinder, sphere, capsule or mesh"));
     }
-    if (kind == "mesh") return CheckMesh(*shape);
-    if (kind == "box") return CheckSizes(*shape, "size", 3);
-    absl::Status good = CheckSizes(*shape, "radius", 1);
-    if (good.ok() && kind != "sphere") good = CheckSizes(*shape, "length", 1);
+    shape->kind = *kind;
+    if (*kind == ShapeKind::kMesh) return TakeMesh(element, shape);
+    if (*kind == ShapeKind::kBox) return TakeSizes(element, "size", shape->size);
+    absl::Status good = TakeSizes(element, "radius", {&shape->radius, 1});
+    if (good.ok() && *kind != ShapeKind::kSphere) {
+      good = TakeSizes(element, "length", {&shape->length, 1});
+    }
     return good;
   }
 
-  absl::Status CheckMesh(const TiXmlElement& mesh) const {
-    if (AttributeOf(mesh, "filename").empty()) {
-      return document_.ErrorAt(mesh, "<mesh> lacks filename=\"...\"");
-    }
-    if (mesh.Attribute("scale") == nullptr) return absl::OkStatus();
-    const auto scale = NumbersOf(document_, mesh, "scale", 3);
-    if (!scale.ok()) return scale.status();
-    const bool is_flat = std::count(scale->begin(), scale->end(), 0) > 0;
-    return is_flat ? document_.ErrorAt(mesh, "<mesh> scale must not be 0") : absl::OkStatus();
-  }
-
-  absl::Status CheckSizes(const TiXmlElement& shape, const char* attribute, size_t count) const {
-    const auto sizes = NumbersOf(document_, shape, attribute, count);
-    if (!sizes.ok()) return sizes.status();
-    for (const double size : *sizes) {
-      if (size > 0) continue;
-      return document_.ErrorAt(
-          shape, absl::StrCat("<", shape.ValueStr(), "> ", attribute, " must be above 0"));
+  absl::Status TakeMesh(pugi::xml_node mesh, CollisionShape* shape) const {
+    shape->mesh = mesh.attribute("filename").value();
+    if (shape->mesh.empty()) return document_.ErrorAt(mesh, "<mesh> lacks filename=\"...\"");
+    if (!mesh.attribute("scale")) return absl::OkStatus();
+    const auto numbers = NumbersOf(document_, mesh, "scale", 3);
+    if (!numbers.ok()) return numbers.status();
+    const bool is_flat = std::count(numbers->begin(), numbers->end(), 0) > 0;
+    if (is_flat) return document_.ErrorAt(mesh, "<mesh> scale must not be 0");
+    // From the text, because a double would be rounded.
+    std::string_view rest = mesh.attribute("scale").value();
+    for (LengthScale& factor : shape->scale) {
+      factor = LengthScale::FromText(NextToken(&rest)).value_or(LengthScale());
     }
     return absl::OkStatus();
   }
 
-  absl::StatusOr<std::string> LinkOf(const TiXmlElement& joint, const char* end) const {
-    const TiXmlElement* const element = joint.FirstChildElement(end);
-    const std::string joint_name = Quoted(AttributeOf(joint, "name"));
-    if (element == nullptr || AttributeOf(*element, "link").empty()) {
+  absl::Status TakeSizes(pugi::xml_node shape, const char* attribute,
+                         std::span<double> sizes) const {
+    const auto numbers = NumbersOf(document_, shape, attribute, sizes.size());
+    if (!numbers.ok()) return numbers.status();
+    std::copy(numbers->begin(), numbers->end(), sizes.begin());
+    if (std::ranges::all_of(sizes, [](double size) { return size > 0; })) return absl::OkStatus();
+    return document_.ErrorAt(shape,
+                             absl::StrCat("<", shape.name(), "> ", attribute, " must be above 0"));
+  }
+
+  absl::StatusOr<std::string> LinkOf(pugi::xml_node joint, const char* end) const {
+    const pugi::xml_node element = joint.child(end);
+    const std::string joint_name = Quoted(joint.attribute("name").value());
+    const std::string link = element.attribute("link").value();
+    if (link.empty()) {
       return document_.ErrorAt(joint,
                                absl::StrCat("joint ", joint_name, " lacks <", end, " link=\"\">"));
     }
-    std::string link = AttributeOf(*element, "link");
     if (links_.contains(link)) return link;
-    return document_.ErrorAt(*element, absl::StrCat("joint ", joint_name, " has a ", end,
-                                                    " that does not exist: ", Quoted(link)));
+    return document_.ErrorAt(element, absl::StrCat("joint ", joint_name, " has a ", end,
+                                                   " that does not exist: ", Quoted(link)));
   }
 
-  absl::Status TakeJoint(const TiXmlElement& joint) {
-    const auto name = NameOf(joint);
+  absl::Status TakeJoint(pugi::xml_node element) {
+    const auto name = NameOf(element);
     if (!name.ok()) return name.status();
-    const auto [other, is_new] = joints_.emplace(*name, &joint);
-    if (!is_new) {
-      return document_.ErrorAt(joint, absl::StrCat("joint ", Quoted(*name),
-                                                   " is defined twice; the first definition is ",
-                                                   "in line ", other->second->Row()));
-    }
-    const std::string kind = AttributeOf(joint, "type");
-    if (std::find(std::begin(kJoints), std::end(kJoints), kind) == std::end(kJoints)) {
+    const auto [entry, is_new] = joints_.try_emplace(*name);
+    Joint& joint = entry->second;
+    if (!is_new) return DefinedTwice(element, joint.element);
+    joint.element = element;
+    joint.joint.name = *name;
+    const std::string type = element.attribute("type").value();
+    const std::optional<JointKind> kind = KindOf(kJoints, type);
+    if (!kind) {
       return document_.ErrorAt(
-          joint, absl::StrCat("joint ", Quoted(*name), " has type ", Quoted(kind),
-                              "; types are fixed, revolute, continuous, prismatic, planar and "
-                              "floating"));
+          element, absl::StrCat("joint ", Quoted(*name), " has type ", Quoted(type),
+                                "; types are fixed, revolute, continuous, prismatic, planar and "
+                                "floating"));
     }
-    absl::Status good = CheckOrigin(joint);
-    if (good.ok()) good = CheckAxisAndLimits(joint, kind);
+    joint.joint.kind = *kind;
+    absl::Status good = TakeOrigin(element, &joint.joint.X_PJ);
+    if (good.ok()) good = TakeAxis(element, &joint.joint);
+    if (good.ok()) good = TakeLimits(element, &joint.joint);
     if (!good.ok()) return good;
-    const auto parent = LinkOf(joint, "parent");
-    if (!parent.ok()) return parent.status();
-    const auto child = LinkOf(joint, "child");
-    if (!child.ok()) return child.status();
-    if (!parent_of_.emplace(*child, *parent).second) {
-      return document_.ErrorAt(
-          joint, absl::StrCat("link ", Quoted(*child),
+    for (const auto& [end, link] : {std::pair("parent", &joint.parent), {"child", &joint.child}}) {
+      auto found = LinkOf(element, end);
+      if (!found.ok()) return found.status();
+      *link = *std::move(found);
+    }
+    if (parent_of_.emplace(joint.child, joint.parent).second) return absl::OkStatus();
+    return document_.ErrorAt(
+        element, absl::StrCat("link ", Quoted(joint.child),
                               " is the child of two joints; the second is ", Quoted(*name)));
-    }
-    return absl::OkStatus();
   }
 
-  absl::Status CheckAxisAndLimits(const TiXmlElement& joint, const std::string& kind) const {
-    if (kind == "fixed" || kind == "floating") return absl::OkStatus();
-    if (const TiXmlElement* const axis = joint.FirstChildElement("axis"); axis != nullptr) {
-      const auto xyz = NumbersOf(document_, *axis, "xyz", 3);
-      if (!xyz.ok()) return xyz.status();
-      if ((*xyz)[0] == 0 && (*xyz)[1] == 0 && (*xyz)[2] == 0) {
-        return document_.ErrorAt(*axis, "<axis> xyz must not be 0 0 0");
-      }
-    } else if (kind == "planar") {
+  absl::Status TakeAxis(pugi::xml_node element, RobotJoint* joint) const {
+    if (joint->kind == JointKind::kFixed || joint->kind == JointKind::kFloating) {
+      return absl::OkStatus();
+    }
+    const pugi::xml_node axis = element.child("axis");
+    if (!axis) {
+      if (joint->kind != JointKind::kPlanar) return absl::OkStatus();
       // URDF's default, x, is rarely intended.
-      return document_.ErrorAt(joint, absl::StrCat("joint ", Quoted(AttributeOf(joint, "name")),
-                                                   " lacks <axis xyz=\"0 0 1\"/>, the normal of "
-                                                   "its plane"));
+      return document_.ErrorAt(element, absl::StrCat("joint ", Quoted(joint->name),
+                                                     " lacks <axis xyz=\"0 0 1\"/>, the normal of "
+                                                     "its plane"));
     }
-    if (kind == "continuous" || kind == "planar") return absl::OkStatus();
-    const TiXmlElement* const limit = joint.FirstChildElement("limit");
-    // A mimic joint needs no limits of its own.
-    if (limit == nullptr && joint.FirstChildElement("mimic") != nullptr) return absl::OkStatus();
-    if (limit == nullptr) {
-      return document_.ErrorAt(joint, absl::StrCat("joint ", Quoted(AttributeOf(joint, "name")),
-                                                   " lacks <limit lower=\"\" upper=\"\" ...>"));
-    }
-    for (const char* attribute : {"lower", "upper"}) {
-      if (limit->Attribute(attribute) == nullptr) continue;
-      const auto value = NumbersOf(document_, *limit, attribute, 1);
-      if (!value.ok()) return value.status();
+    const auto xyz = NumbersOf(document_, axis, "xyz", 3);
+    if (!xyz.ok()) return xyz.status();
+    std::copy(xyz->begin(), xyz->end(), joint->axis.begin());
+    const double length = std::hypot((*xyz)[0], (*xyz)[1], (*xyz)[2]);
+    if (length == 0) return document_.ErrorAt(axis, "<axis> xyz must not be 0 0 0");
+    // The travel of a prismatic joint is its value, regardless of the length of the axis.
+    if (length != 1) {
+      for (double& x : joint->axis) x /= length;
     }
     return absl::OkStatus();
   }
 
-  absl::Status CheckMimic(const TiXmlElement& joint) const {
-    std::string name = AttributeOf(joint, "name");
+  absl::Status TakeLimits(pugi::xml_node element, RobotJoint* joint) const {
+    if (joint->kind != JointKind::kRevolute && joint->kind != JointKind::kPrismatic) {
+      return absl::OkStatus();
+    }
+    const pugi::xml_node limit = element.child("limit");
+    // A mimic joint needs no limits of its own.
+    if (!limit && element.child("mimic")) return absl::OkStatus();
+    if (!limit) {
+      return document_.ErrorAt(element, absl::StrCat("joint ", Quoted(joint->name),
+                                                     " lacks <limit lower=\"\" upper=\"\" ...>"));
+    }
+    std::array<double, 2>& range = joint->limits.emplace();
+    absl::Status good = TakeNumber(limit, "lower", &range[0]);
+    if (good.ok()) good = TakeNumber(limit, "upper", &range[1]);
+    return good;
+  }
+
+  absl::Status TakeMimic(Joint* joint) const {
+    const pugi::xml_node mimic = joint->element.child("mimic");
+    if (!mimic) return absl::OkStatus();
+    absl::Status good = TakeNumber(mimic, "multiplier", &joint->joint.multiplier);
+    if (good.ok()) good = TakeNumber(mimic, "offset", &joint->joint.offset);
+    if (!good.ok()) return good;
+    joint->leader = mimic.attribute("joint").value();
+    const auto leader = joints_.find(joint->leader);
+    if (leader == joints_.end()) {
+      return document_.ErrorAt(
+          mimic, absl::StrCat("joint ", Quoted(joint->joint.name),
+                              " mimics a joint that does not exist: ", Quoted(joint->leader)));
+    }
+    for (const RobotJoint& one : {joint->joint, leader->second.joint}) {
+      if (!one.is_loose()) continue;
+      return document_.ErrorAt(
+          mimic, absl::StrCat("joint ", Quoted(one.name), " is ",
+                              one.kind == JointKind::kPlanar ? "planar" : "floating",
+                              "; a mimic joint and its leader must have one value each"));
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status CheckMimicChain(const Joint& joint) const {
+    const Joint* at = &joint;
     // A chain with more steps than joints proves a cycle.
     for (size_t step = 0; step <= joints_.size(); ++step) {
-      const TiXmlElement* const at = joints_.at(name);
-      const TiXmlElement* const mimic = at->FirstChildElement("mimic");
-      if (mimic == nullptr) return absl::OkStatus();
-      for (const char* attribute : {"multiplier", "offset"}) {
-        if (mimic->Attribute(attribute) == nullptr) continue;
-        const auto value = NumbersOf(document_, *mimic, attribute, 1);
-        if (!value.ok()) return value.status();
-      }
-      std::string leader = AttributeOf(*mimic, "joint");
-      if (!joints_.contains(leader)) {
-        return document_.ErrorAt(
-            *mimic, absl::StrCat("joint ", Quoted(name),
-                                 " mimics a joint that does not exist: ", Quoted(leader)));
-      }
-      for (const std::string& one : {name, leader}) {
-        const std::string kind = AttributeOf(*joints_.at(one), "type");
-        if (kind != "planar" && kind != "floating") continue;
-        return document_.ErrorAt(
-            *mimic, absl::StrCat("joint ", Quoted(one), " is ", kind,
-                                 "; a mimic joint and its leader must have one value each"));
-      }
-      name = std::move(leader);
+      if (at->leader.empty()) return absl::OkStatus();
+      at = &joints_.at(at->leader);
     }
-    return document_.ErrorAt(joint, absl::StrCat("joint ", Quoted(AttributeOf(joint, "name")),
-                                                 " mimics itself through other joints"));
+    return document_.ErrorAt(joint.element, absl::StrCat("joint ", Quoted(joint.joint.name),
+                                                         " mimics itself through other joints"));
   }
 
-  absl::Status CheckTree() const {
-    const TiXmlElement* root = nullptr;
-    for (const auto& [name, element] : links_) {
+  // Returns the only link that is no child. Otherwise, the links do not form a tree.
+  absl::StatusOr<std::string> FindRoot() const {
+    pugi::xml_node root;
+    for (const auto& [name, link] : links_) {
       if (parent_of_.contains(name)) {
         std::string up = name;
         size_t steps = 0;
@@ -258,232 +331,72 @@ class UrdfCheck {
           up = parent->second;
           if (++steps <= links_.size()) continue;
           return document_.ErrorAt(
-              *element, absl::StrCat("link ", Quoted(name), " is part of a cycle of joints"));
+              link.element, absl::StrCat("link ", Quoted(name), " is part of a cycle of joints"));
         }
         continue;
       }
-      if (root != nullptr) {
-        const TiXmlElement& later = root->Row() < element->Row() ? *element : *root;
+      if (root) {
+        const bool is_later = document_.LineOf(root) < document_.LineOf(link.element);
+        const pugi::xml_node later = is_later ? link.element : root;
+        const pugi::xml_node earlier = is_later ? root : link.element;
         return document_.ErrorAt(
             later,
-            absl::StrCat("link ", Quoted(AttributeOf(later, "name")), " has no parent joint, like ",
-                         Quoted(AttributeOf(root == &later ? *element : *root, "name")),
+            absl::StrCat("link ", Quoted(later.attribute("name").value()),
+                         " has no parent joint, like ", Quoted(earlier.attribute("name").value()),
                          "; exactly one link may be the root"));
       }
-      root = element;
+      root = link.element;
     }
-    return absl::OkStatus();
+    return std::string(root.attribute("name").value());
+  }
+
+  // Returns the tree: parents before their children, and siblings in the order of their joints'
+  // names.
+  Robot Assemble(const std::string& root) {
+    std::map<std::string, std::vector<Joint*>> below;
+    for (auto& [name, joint] : joints_) below[joint.parent].push_back(&joint);
+    Robot robot;
+    std::vector<std::pair<std::string, Joint*>> pending = {{root, nullptr}};
+    while (!pending.empty()) {
+      const auto [name, above] = pending.back();
+      pending.pop_back();
+      const int index = static_cast<int>(robot.links.size());
+      RobotLink& link = robot.links.emplace_back();
+      link.name = name;
+      link.shapes = std::move(links_.at(name).shapes);
+      if (above != nullptr) {
+        above->joint.child = index;
+        link.parent_joint = static_cast<int>(robot.joints.size());
+        robot.joints.push_back(above->joint);
+      }
+      std::vector<Joint*>& children = below[name];
+      for (auto child = children.rbegin(); child != children.rend(); ++child) {
+        (*child)->joint.parent = index;
+        pending.emplace_back((*child)->child, *child);
+      }
+    }
+    for (RobotJoint& joint : robot.joints) {
+      const std::string& leader = joints_.at(joint.name).leader;
+      if (!leader.empty() && joint.kind != JointKind::kFixed) {
+        joint.mimics = robot.FindJoint(leader);
+      }
+    }
+    return robot;
   }
 
   const XmlDocument& document_;
-  std::map<std::string, const TiXmlElement*> links_;
-  std::map<std::string, const TiXmlElement*> joints_;
-  // Keyed by child.
+  std::map<std::string, Link> links_;
+  std::map<std::string, Joint> joints_;
+  // Links, keyed by child.
   std::map<std::string, std::string> parent_of_;
 };
-
-// Properties of a shape that the library does not read.
-struct ShapePlace {
-  int line = 0;
-  bool is_capsule = false;
-  // For a mesh: the exact text, because the library rounds it to doubles.
-  std::array<LengthScale, 3> scale;
-};
-
-// Parts of the document that the library does not read.
-struct Extras {
-  // Shapes by link.
-  std::map<std::string, std::vector<ShapePlace>> shapes;
-  // Joints without <limit>, which the library requires.
-  std::set<std::string> unlimited;
-};
-
-// Requires an attribute that CheckMesh accepted, or none.
-std::array<LengthScale, 3> ScaleOf(const TiXmlElement& shape) {
-  std::array<LengthScale, 3> scale;
-  const std::string text = AttributeOf(shape, "scale");
-  std::string_view rest = text;
-  for (LengthScale& factor : scale) {
-    factor = LengthScale::FromText(NextToken(&rest)).value_or(LengthScale());
-  }
-  return scale;
-}
-
-// Reduces the document to the elements that the library is to read. Capsules become cylinders.
-Extras PrepareForLibrary(TiXmlElement* root) {
-  Extras extras;
-  for (TiXmlElement* child = root->FirstChildElement(); child != nullptr;) {
-    TiXmlElement* const next = child->NextSiblingElement();
-    if (child->ValueStr() != "link" && child->ValueStr() != "joint") {
-      root->RemoveChild(child);
-    } else if (child->ValueStr() == "joint") {
-      // The library requires forces and speeds, which are not used here.
-      for (const char* name : {"dynamics", "safety_controller", "calibration"}) {
-        while (TiXmlElement* const part = child->FirstChildElement(name)) child->RemoveChild(part);
-      }
-      if (TiXmlElement* const limit = child->FirstChildElement("limit"); limit != nullptr) {
-        limit->SetAttribute("effort", "0");
-        limit->SetAttribute("velocity", "0");
-      } else {
-        extras.unlimited.insert(AttributeOf(*child, "name"));
-        child->InsertEndChild(TiXmlElement("limit"))->ToElement()->SetAttribute("effort", "0");
-        child->FirstChildElement("limit")->SetAttribute("velocity", "0");
-      }
-    } else {
-      std::vector<ShapePlace>& shapes = extras.shapes[AttributeOf(*child, "name")];
-      for (TiXmlElement* part = child->FirstChildElement(); part != nullptr;) {
-        TiXmlElement* const after = part->NextSiblingElement();
-        if (part->ValueStr() != "collision") {
-          child->RemoveChild(part);
-        } else {
-          TiXmlElement* const shape = part->FirstChildElement("geometry")->FirstChildElement();
-          const bool is_capsule = shape->ValueStr() == "capsule";
-          if (is_capsule) shape->SetValue("cylinder");
-          shapes.push_back({part->Row(), is_capsule, ScaleOf(*shape)});
-        }
-        part = after;
-      }
-    }
-    child = next;
-  }
-  return extras;
-}
-
-RigidPose PoseOf(const urdf::Pose& pose) {
-  const urdf::Rotation& q = pose.rotation;
-  return {q.w, q.x, q.y, q.z, pose.position.x, pose.position.y, pose.position.z};
-}
-
-CollisionShape ShapeOf(const urdf::Collision& collision, const ShapePlace& place) {
-  CollisionShape shape;
-  shape.X_LS = PoseOf(collision.origin);
-  shape.line = place.line;
-  switch (collision.geometry->type) {
-    case urdf::Geometry::BOX: {
-      const urdf::Vector3& size = static_cast<const urdf::Box&>(*collision.geometry).dim;
-      shape.kind = ShapeKind::kBox;
-      shape.size = {size.x, size.y, size.z};
-      break;
-    }
-    case urdf::Geometry::SPHERE:
-      shape.kind = ShapeKind::kSphere;
-      shape.radius = static_cast<const urdf::Sphere&>(*collision.geometry).radius;
-      break;
-    case urdf::Geometry::CYLINDER: {
-      const auto& cylinder = static_cast<const urdf::Cylinder&>(*collision.geometry);
-      shape.kind = place.is_capsule ? ShapeKind::kCapsule : ShapeKind::kCylinder;
-      shape.radius = cylinder.radius;
-      shape.length = cylinder.length;
-      break;
-    }
-    default: {
-      const auto& mesh = static_cast<const urdf::Mesh&>(*collision.geometry);
-      shape.kind = ShapeKind::kMesh;
-      shape.mesh = mesh.filename;
-      shape.scale = place.scale;
-    }
-  }
-  return shape;
-}
-
-RobotJoint JointOf(const urdf::Joint& from, const Extras& extras) {
-  RobotJoint joint;
-  joint.name = from.name;
-  joint.kind = from.type == urdf::Joint::REVOLUTE     ? JointKind::kRevolute
-               : from.type == urdf::Joint::CONTINUOUS ? JointKind::kContinuous
-               : from.type == urdf::Joint::PRISMATIC  ? JointKind::kPrismatic
-               : from.type == urdf::Joint::PLANAR     ? JointKind::kPlanar
-               : from.type == urdf::Joint::FLOATING   ? JointKind::kFloating
-                                                      : JointKind::kFixed;
-  joint.X_PJ = PoseOf(from.parent_to_joint_origin_transform);
-  if (joint.kind == JointKind::kFixed || joint.kind == JointKind::kFloating) return joint;
-  const double length = std::hypot(from.axis.x, from.axis.y, from.axis.z);
-  joint.axis = {from.axis.x, from.axis.y, from.axis.z};
-  // The travel of a prismatic joint is its value, regardless of the length of the axis.
-  if (length != 1) {
-    for (double& x : joint.axis) x /= length;
-  }
-  const bool limited =
-      (joint.kind == JointKind::kRevolute || joint.kind == JointKind::kPrismatic) &&
-      from.limits != nullptr && !extras.unlimited.contains(joint.name);
-  if (limited) joint.limits = {from.limits->lower, from.limits->upper};
-  return joint;
-}
-
-// Converts the model, parents before their children.
-absl::StatusOr<Robot> RobotOf(const urdf::ModelInterface& model, const Extras& extras,
-                              const std::string& file) {
-  Robot robot;
-  robot.name = model.getName();
-  std::vector<std::pair<const urdf::Link*, int>> pending = {{model.getRoot().get(), -1}};
-  std::map<std::string, int> index_of;
-  while (!pending.empty()) {
-    const auto [from, parent] = pending.back();
-    pending.pop_back();
-    const int index = static_cast<int>(robot.links.size());
-    RobotLink link;
-    link.name = from->name;
-    // A name with characters that XML cannot represent may not survive the round trip.
-    const auto known = extras.shapes.find(from->name);
-    if (known == extras.shapes.end() || known->second.size() != from->collision_array.size()) {
-      return absl::InvalidArgumentError(absl::StrCat(
-          file, ": liburdfdom reads link ", Quoted(from->name), " differently; use a plain name"));
-    }
-    const std::vector<ShapePlace>& lines = known->second;
-    for (size_t i = 0; i < lines.size(); ++i) {
-      link.shapes.push_back(ShapeOf(*from->collision_array[i], lines[i]));
-    }
-    if (from->parent_joint != nullptr) {
-      RobotJoint joint = JointOf(*from->parent_joint, extras);
-      joint.parent = parent;
-      joint.child = index;
-      link.parent_joint = static_cast<int>(robot.joints.size());
-      index_of[joint.name] = link.parent_joint;
-      robot.joints.push_back(std::move(joint));
-    }
-    robot.links.push_back(std::move(link));
-    // Pushed in reverse, so that the order is the file's, as far as the library preserves it.
-    for (auto child = from->child_links.rbegin(); child != from->child_links.rend(); ++child) {
-      pending.push_back({child->get(), index});
-    }
-  }
-  for (RobotJoint& joint : robot.joints) {
-    const urdf::JointMimicSharedPtr mimic = model.getJoint(joint.name)->mimic;
-    if (mimic == nullptr || joint.kind == JointKind::kFixed) continue;
-    const auto leader = index_of.find(mimic->joint_name);
-    if (leader == index_of.end()) {
-      return absl::InvalidArgumentError(absl::StrCat(
-          file, ": liburdfdom reads joint ", Quoted(joint.name), " differently; use plain names"));
-    }
-    joint.mimics = leader->second;
-    joint.multiplier = mimic->multiplier;
-    joint.offset = mimic->offset;
-  }
-  return robot;
-}
 
 }  // namespace
 
 absl::StatusOr<Robot> ParseUrdf(const std::string& text, const std::string& name) {
-  auto document = ParseXml(text, name, "robot");
+  const auto document = ParseXml(text, name, "robot");
   if (!document.ok()) return document.status();
-  if (absl::Status good = UrdfCheck(**document).Run(); !good.ok()) return good;
-  const Extras extras = PrepareForLibrary((*document)->tree.RootElement());
-  TiXmlPrinter printer;
-  (*document)->tree.Accept(&printer);
-  const FirstError error;
-  urdf::ModelInterfaceSharedPtr model;
-  std::string problem;
-  try {
-    model = urdf::parseURDF(printer.Str());
-    problem = error.text();
-  } catch (const std::exception& exception) {
-    problem = exception.what();
-  }
-  if (model == nullptr || model->getRoot() == nullptr) {
-    return absl::InvalidArgumentError(absl::StrCat(name, ": liburdfdom refuses it: ", problem));
-  }
-  return RobotOf(*model, extras, name);
+  return UrdfReader(**document).Run();
 }
 
 absl::StatusOr<Robot> ReadUrdf(const std::string& path) {

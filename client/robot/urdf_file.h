@@ -10,8 +10,7 @@
 namespace hulld {
 
 // Reads links, joints, and collision shapes from a robot description; "-" is standard input.
-// Ignores other elements (visual, inertial, transmissions, simulators). liburdfdom parses the
-// values. Capsules, which its version 3 does not support, are parsed here.
+// Ignores other elements (visual, inertial, transmissions, simulators).
 //
 // INVALID_ARGUMENT names file and line, and the defect of the element: malformed XML, an invalid
 // number, a link or joint without a name or with a duplicate name, a shape without a size above 0,

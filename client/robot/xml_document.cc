@@ -3,11 +3,12 @@
 #include <absl/strings/ascii.h>
 #include <absl/strings/str_cat.h>
 
+#include <algorithm>
 #include <cmath>
+#include <set>
 #include <string_view>
 #include <utility>
 
-#include "client/formats/byte_source.h"
 #include "client/formats/text_number.h"
 
 namespace hulld {
@@ -16,8 +17,8 @@ namespace {
 bool IsSpace(char c) { return absl::ascii_isspace(static_cast<unsigned char>(c)); }
 bool EndsName(char c) { return IsSpace(c) || c == '>' || c == '/' || c == '=' || c == '<'; }
 
-// Checks that the tags of a text are well-formed before TinyXML parses it: TinyXML silently closes
-// open tags, and recurses as deep as tags are nested.
+// Checks that the tags of a text are well-formed before pugixml parses it. Its errors name neither
+// the tag nor the attribute, and it accepts an attribute twice.
 class TagWalk {
  public:
   TagWalk(std::string_view text, const std::string& name) : text_(text), name_(name) {}
@@ -117,6 +118,7 @@ class TagWalk {
       return Error(absl::StrCat("<", name, "> is a macro; expand the file with 'xacro' first"));
     }
     if (open_.empty() && ++roots_ > 1) return Error("a second root element");
+    std::set<std::string> attributes;
     for (;;) {
       SkipSpace();
       if (at_ >= text_.size()) return Error(absl::StrCat("the tag <", name, " is not closed by >"));
@@ -132,16 +134,19 @@ class TagWalk {
         Advance(2);
         return absl::OkStatus();
       }
-      if (absl::Status attribute = TakeAttribute(name); !attribute.ok()) return attribute;
+      if (absl::Status taken = TakeAttribute(name, &attributes); !taken.ok()) return taken;
     }
   }
 
-  absl::Status TakeAttribute(const std::string& element) {
+  absl::Status TakeAttribute(const std::string& element, std::set<std::string>* known) {
     const std::string name = TakeName();
     SkipSpace();
     if (name.empty() || at_ >= text_.size() || text_[at_] != '=') {
       return Error(absl::StrCat("in <", element, ">, ", Quoted(name),
                                 " is not an attribute; write NAME=\"VALUE\""));
+    }
+    if (!known->insert(name).second) {
+      return Error(absl::StrCat("<", element, "> has the attribute ", name, " twice"));
     }
     Advance(1);
     SkipSpace();
@@ -169,8 +174,13 @@ class TagWalk {
 
 }  // namespace
 
-absl::Status XmlDocument::ErrorAt(const TiXmlElement& element, const std::string& message) const {
-  return absl::InvalidArgumentError(absl::StrCat(name, ":", element.Row(), ": ", message));
+int XmlDocument::LineOf(pugi::xml_node element) const {
+  return 1 +
+         static_cast<int>(std::count(text.begin(), text.begin() + element.offset_debug(), '\n'));
+}
+
+absl::Status XmlDocument::ErrorAt(pugi::xml_node element, const std::string& message) const {
+  return absl::InvalidArgumentError(absl::StrCat(name, ":", LineOf(element), ": ", message));
 }
 
 absl::StatusOr<std::unique_ptr<XmlDocument>> ParseXml(const std::string& text,
@@ -179,49 +189,24 @@ absl::StatusOr<std::unique_ptr<XmlDocument>> ParseXml(const std::string& text,
   if (absl::Status walked = TagWalk(text, name).Run(); !walked.ok()) return walked;
   auto document = std::make_unique<XmlDocument>();
   document->name = name;
-  document->tree.Parse(text.c_str(), nullptr, TIXML_ENCODING_UTF8);
-  if (document->tree.Error()) {
-    return absl::InvalidArgumentError(absl::StrCat(
-        name, ":", document->tree.ErrorRow(), ": not valid XML: ", document->tree.ErrorDesc()));
+  document->text = text;
+  const pugi::xml_parse_result parsed = document->tree.load_buffer(
+      text.data(), text.size(), pugi::parse_default, pugi::encoding_utf8);
+  if (!parsed) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(name, ": not valid XML: ", parsed.description()));
   }
-  const TiXmlElement* const element = document->tree.RootElement();
-  if (element == nullptr) {
-    return absl::InvalidArgumentError(absl::StrCat(name, ": contains no element"));
-  }
-  if (element->ValueStr() != root) {
-    return document->ErrorAt(*element, absl::StrCat("the outermost element is <",
-                                                    element->ValueStr(), ">, not <", root, ">"));
-  }
-  return document;
+  if (document->root().name() == root) return document;
+  return document->ErrorAt(
+      document->root(),
+      absl::StrCat("the outermost element is <", document->root().name(), ">, not <", root, ">"));
 }
 
-absl::StatusOr<std::unique_ptr<XmlDocument>> ReadXml(const std::string& path,
-                                                     const std::string& root) {
-  const auto text = ReadText(path);
-  if (!text.ok()) return text.status();
-  return ParseXml(*text, path == "-" ? "standard input" : path, root);
-}
-
-std::vector<const TiXmlElement*> ChildrenOf(const TiXmlElement& parent, const char* name) {
-  std::vector<const TiXmlElement*> children;
-  for (const TiXmlElement* child = parent.FirstChildElement(name); child != nullptr;
-       child = child->NextSiblingElement(name)) {
-    children.push_back(child);
-  }
-  return children;
-}
-
-std::string AttributeOf(const TiXmlElement& element, const char* name) {
-  const char* const value = element.Attribute(name);
-  return value == nullptr ? "" : value;
-}
-
-absl::StatusOr<std::vector<double>> NumbersOf(const XmlDocument& document,
-                                              const TiXmlElement& element, const char* attribute,
-                                              size_t count) {
-  const std::string text = AttributeOf(element, attribute);
+absl::StatusOr<std::vector<double>> NumbersOf(const XmlDocument& document, pugi::xml_node element,
+                                              const char* attribute, size_t count) {
+  const std::string_view text = element.attribute(attribute).value();
   const auto error = [&](const std::string& problem) {
-    return document.ErrorAt(element, absl::StrCat("<", element.ValueStr(), "> ", problem));
+    return document.ErrorAt(element, absl::StrCat("<", element.name(), "> ", problem));
   };
   std::vector<double> numbers;
   std::string_view rest = text;
@@ -237,7 +222,7 @@ absl::StatusOr<std::vector<double>> NumbersOf(const XmlDocument& document,
     numbers.push_back(number);
   }
   if (numbers.size() == count) return numbers;
-  if (element.Attribute(attribute) == nullptr) {
+  if (!element.attribute(attribute)) {
     return error(absl::StrCat("lacks ", attribute, "=\"...\""));
   }
   return error(absl::StrCat(attribute, " needs ", count, count == 1 ? " number" : " numbers",
