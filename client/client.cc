@@ -10,6 +10,7 @@
 
 #include "client/calls/grpc_status.h"
 #include "client/server_address.h"
+#include "client/status_macros.h"
 
 namespace hulld {
 namespace {
@@ -93,20 +94,19 @@ absl::StatusOr<Response> ListAll(const std::string& prefix, uint64_t limit,
   do {
     const uint64_t missing = limit == 0 ? kLargestPage : limit - count();
     request.set_page_size(static_cast<uint32_t>(std::min(missing, kLargestPage)));
-    absl::StatusOr<Response> page = list_page(request);
-    if (!page.ok()) return page.status();
-    *all.mutable_header() = page->header();
-    items(all)->MergeFrom(*items(*page));
-    if (!page->next_page_token().empty() && page->next_page_token() == request.page_token()) {
+    HULLD_ASSIGN_OR_RETURN(Response page, list_page(request));
+    *all.mutable_header() = page.header();
+    items(all)->MergeFrom(*items(page));
+    if (!page.next_page_token().empty() && page.next_page_token() == request.page_token()) {
       return absl::InternalError("the server returned the same page token twice");
     }
-    all.set_next_page_token(page->next_page_token());
+    all.set_next_page_token(page.next_page_token());
     // Otherwise a later page could come from an older snapshot and lack items.
     if (!is_linearizable) {
-      request.mutable_freshness()->set_at_least_revision(page->header().revision());
-      request.mutable_freshness()->set_store_id(page->header().store_id());
+      request.mutable_freshness()->set_at_least_revision(page.header().revision());
+      request.mutable_freshness()->set_store_id(page.header().store_id());
     }
-    request.set_page_token(page->next_page_token());
+    request.set_page_token(page.next_page_token());
   } while (!request.page_token().empty() && (limit == 0 || count() < limit));
   return all;
 }
@@ -166,8 +166,7 @@ absl::StatusOr<Response> Client::Call(Stub* stub,
     }
     return FromGrpcStatus(status, context);
   };
-  absl::Status status = retry ? CallWithRetries(options_.retry, deadline, attempt) : attempt();
-  if (!status.ok()) return status;
+  HULLD_RETURN_IF_ERROR(retry ? CallWithRetries(options_.retry, deadline, attempt) : attempt());
   return response;
 }
 
@@ -187,7 +186,7 @@ absl::StatusOr<std::unique_ptr<Appender>> Client::OpenAppend(const std::string& 
   open.set_create_if_absent(options.create_if_absent);
   std::unique_ptr<Appender> appender(
       new Appender(hulls_, std::move(open), std::move(options), options_.timeout, options_.retry));
-  if (absl::Status status = appender->OpenFirst(); !status.ok()) return status;
+  HULLD_RETURN_IF_ERROR(appender->OpenFirst());
   return appender;
 }
 

@@ -6,6 +6,7 @@
 #include <optional>
 #include <utility>
 
+#include "client/status_macros.h"
 #include "client/verify/certificate_check.h"
 #include "client/verify/motion_check.h"
 #include "client/verify/piece_check.h"
@@ -143,10 +144,9 @@ absl::StatusOr<std::optional<PlacedVertices>> AnswerChecker::FetchHull(
     }
     return PlacedVertices{xyz, placement.pose(), nullptr, true, {placement.radius()}};
   }
-  const auto mesh = Fetch(version, problem);
-  if (!mesh.ok()) return mesh.status();
-  if (*mesh == nullptr) return std::nullopt;
-  return PlacedVertices{(*mesh)->xyz, placement.pose(), nullptr, false, {placement.radius()}};
+  HULLD_ASSIGN_OR_RETURN(const auto mesh, Fetch(version, problem));
+  if (mesh == nullptr) return std::nullopt;
+  return PlacedVertices{mesh->xyz, placement.pose(), nullptr, false, {placement.radius()}};
 }
 
 absl::StatusOr<const v1::GetBodyResponse*> AnswerChecker::FetchBody(const v1::HullVersion& version,
@@ -177,19 +177,17 @@ absl::StatusOr<std::vector<PlacedVertices>> AnswerChecker::FetchPieces(
   std::vector<PlacedVertices> pieces;
   const v1::GetBodyResponse* body = nullptr;
   if (!placement.has_points()) {
-    const auto fetched = FetchBody(version, problem);
-    if (!fetched.ok()) return fetched.status();
+    HULLD_ASSIGN_OR_RETURN(const auto fetched, FetchBody(version, problem));
     if (!problem->reason.empty()) return pieces;
-    body = *fetched;
+    body = fetched;
   }
   if (body == nullptr) {
     if (named) {
       *problem = {Verdict::kMoved, absl::StrCat("body ", version.hull_id(), " was deleted")};
       return pieces;
     }
-    const auto hull = FetchHull(placement, version, problem);
-    if (!hull.ok()) return hull.status();
-    if (hull->has_value()) pieces.push_back(**hull);
+    HULLD_ASSIGN_OR_RETURN(const auto hull, FetchHull(placement, version, problem));
+    if (hull.has_value()) pieces.push_back(*hull);
     return pieces;
   }
   for (const v1::Placement& piece : body->pieces()) {
@@ -200,14 +198,10 @@ absl::StatusOr<std::vector<PlacedVertices>> AnswerChecker::FetchPieces(
                                piece.hull_id(), ", whose revision the answer does not state")};
       return pieces;
     }
-    const auto mesh = Fetch(*hull->second, problem);
-    if (!mesh.ok()) return mesh.status();
-    if (*mesh == nullptr) return pieces;
-    pieces.push_back({(*mesh)->xyz,
-                      placement.pose(),
-                      &piece.pose(),
-                      false,
-                      {placement.radius(), piece.radius()}});
+    HULLD_ASSIGN_OR_RETURN(const auto mesh, Fetch(*hull->second, problem));
+    if (mesh == nullptr) return pieces;
+    pieces.push_back(
+        {mesh->xyz, placement.pose(), &piece.pose(), false, {placement.radius(), piece.radius()}});
   }
   return pieces;
 }
@@ -218,13 +212,11 @@ absl::StatusOr<Verification> AnswerChecker::Check(const CheckedAnswer& answer) {
     return *precluded;
   }
   Verification verification;
-  const auto a = FetchHull(answer.a, answer.hull_a, &verification);
-  if (!a.ok()) return a.status();
-  if (!a->has_value()) return verification;
-  const auto b = FetchHull(answer.b, answer.hull_b, &verification);
-  if (!b.ok()) return b.status();
-  if (!b->has_value()) return verification;
-  return FromStatus(CheckProof(answer, **a, **b));
+  HULLD_ASSIGN_OR_RETURN(const auto a, FetchHull(answer.a, answer.hull_a, &verification));
+  if (!a.has_value()) return verification;
+  HULLD_ASSIGN_OR_RETURN(const auto b, FetchHull(answer.b, answer.hull_b, &verification));
+  if (!b.has_value()) return verification;
+  return FromStatus(CheckProof(answer, *a, *b));
 }
 
 absl::StatusOr<Verification> AnswerChecker::Check(const v1::CheckCollisionRequest& request,
@@ -254,15 +246,15 @@ absl::StatusOr<Verification> AnswerChecker::Check(const CheckedBodies& answer) {
     return *precluded;
   }
   Verification verification;
-  const auto a = FetchPieces(answer.a, answer.hull_a, answer.piece_a.has_value(),
-                             answer.piece_hulls, &verification);
-  if (!a.ok()) return a.status();
+  HULLD_ASSIGN_OR_RETURN(const auto a,
+                         FetchPieces(answer.a, answer.hull_a, answer.piece_a.has_value(),
+                                     answer.piece_hulls, &verification));
   if (!verification.reason.empty()) return verification;
-  const auto b = FetchPieces(answer.b, answer.hull_b, answer.piece_b.has_value(),
-                             answer.piece_hulls, &verification);
-  if (!b.ok()) return b.status();
+  HULLD_ASSIGN_OR_RETURN(const auto b,
+                         FetchPieces(answer.b, answer.hull_b, answer.piece_b.has_value(),
+                                     answer.piece_hulls, &verification));
   if (!verification.reason.empty()) return verification;
-  const absl::Status checked = CheckProof(answer, *a, *b);
+  const absl::Status checked = CheckProof(answer, a, b);
   if (!checked.ok() || IsDecidingPairProven(answer)) return FromStatus(checked);
   return Verification{
       Verdict::kInvalid,
@@ -275,12 +267,8 @@ absl::StatusOr<VerifiedResponse> CheckCollisionVerified(const Client& client,
   AnswerChecker checker(client);
   VerifiedResponse verified;
   for (int attempt = 0; attempt < kMeshReadAttempts; ++attempt) {
-    absl::StatusOr<v1::CheckCollisionResponse> response = client.CheckCollision(request);
-    if (!response.ok()) return response.status();
-    verified.response = *std::move(response);
-    absl::StatusOr<Verification> verification = checker.Check(request, verified.response);
-    if (!verification.ok()) return verification.status();
-    verified.verification = *std::move(verification);
+    HULLD_ASSIGN_OR_RETURN(verified.response, client.CheckCollision(request));
+    HULLD_ASSIGN_OR_RETURN(verified.verification, checker.Check(request, verified.response));
     if (verified.verification.verdict != Verdict::kMoved) break;
   }
   return verified;

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "client/status_macros.h"
 #include "client/verify/exact_vector.h"
 
 namespace hulld {
@@ -93,23 +94,23 @@ absl::Status CheckPairs(const v1::Certificate& certificate, int most, const Exac
 
 absl::Status CheckTouching(const v1::Certificate& certificate, const ExactHull& a,
                            const ExactHull& b) {
-  const auto differences = DifferencesOf(certificate, kMaxTouchingPairs, a, b);
-  if (!differences.ok()) return differences.status();
+  HULLD_ASSIGN_OR_RETURN(const auto differences,
+                         DifferencesOf(certificate, kMaxTouchingPairs, a, b));
   BigVector n;
-  if (absl::Status s = ReadDirection(certificate, &n); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(ReadDirection(certificate, &n));
   if (GapSign(a, b, n) < 0) {
     return ProofFails("the direction does not keep the insides apart: max n.A > min n.B");
   }
-  if (HoldsOriginOnBoundary(*differences)) return absl::OkStatus();
+  if (HoldsOriginOnBoundary(differences)) return absl::OkStatus();
   return ProofFails(
       "the vertex pairs show no common point: 0 is not in the hull of their differences");
 }
 
 absl::Status CheckOverlapping(const v1::Certificate& certificate, const ExactHull& a,
                               const ExactHull& b) {
-  const auto differences = DifferencesOf(certificate, kMaxOverlappingPairs, a, b);
-  if (!differences.ok()) return differences.status();
-  if (HoldsOriginInside(*differences)) return absl::OkStatus();
+  HULLD_ASSIGN_OR_RETURN(const auto differences,
+                         DifferencesOf(certificate, kMaxOverlappingPairs, a, b));
+  if (HoldsOriginInside(differences)) return absl::OkStatus();
   return ProofFails("0 is not inside the hull of the differences of the vertex pairs");
 }
 
@@ -125,18 +126,18 @@ absl::Status CheckRounded(v1::Relation relation, const v1::Certificate& certific
   const bool is_touching = relation == v1::RELATION_TOUCHING;
   if (is_separated || is_touching) {
     BigVector n;
-    if (absl::Status s = ReadDirection(certificate, &n); !s.ok()) return s;
+    HULLD_RETURN_IF_ERROR(ReadDirection(certificate, &n));
     if (GapSign(a, b, n) < (is_separated ? 1 : 0)) {
       return ProofFails(
           "the gap between the hulls along the direction is too small for their radii");
     }
     if (is_separated) return absl::OkStatus();
   }
-  const auto differences =
-      DifferencesOf(certificate, is_touching ? kMaxTouchingPairs : kMaxOverlappingPairs, a, b);
-  if (!differences.ok()) return differences.status();
+  HULLD_ASSIGN_OR_RETURN(
+      const auto differences,
+      DifferencesOf(certificate, is_touching ? kMaxTouchingPairs : kMaxOverlappingPairs, a, b));
   const BigInteger r = RadiiOf(a, b);
-  if (ComesWithin(*differences, r * r, /*nearer=*/!is_touching)) return absl::OkStatus();
+  if (ComesWithin(differences, r * r, /*nearer=*/!is_touching)) return absl::OkStatus();
   return ProofFails(
       "the hull of the differences of the vertex pairs is too far from 0 for the radii");
 }
@@ -159,9 +160,9 @@ absl::Status ReadDirection(const v1::Certificate& certificate, BigVector* n, int
     }
     case v1::Certificate::kIntegerDirection: {
       const v1::IntegerDirection& d = certificate.integer_direction();
-      if (absl::Status s = ReadInteger(d.x(), &(*n)[0]); !s.ok()) return s;
-      if (absl::Status s = ReadInteger(d.y(), &(*n)[1]); !s.ok()) return s;
-      if (absl::Status s = ReadInteger(d.z(), &(*n)[2]); !s.ok()) return s;
+      HULLD_RETURN_IF_ERROR(ReadInteger(d.x(), &(*n)[0]));
+      HULLD_RETURN_IF_ERROR(ReadInteger(d.y(), &(*n)[1]));
+      HULLD_RETURN_IF_ERROR(ReadInteger(d.z(), &(*n)[2]));
       break;
     }
     case v1::Certificate::EXACT_DIRECTION_NOT_SET:
@@ -192,7 +193,7 @@ absl::Status CheckRelation(v1::Relation relation) {
 absl::StatusOr<std::vector<BigVector>> DifferencesOf(const v1::Certificate& given, int most,
                                                      const ExactHull& a, const ExactHull& b) {
   const v1::Certificate certificate = Located(given, a, b);
-  if (absl::Status s = CheckPairs(certificate, most, a, b); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(CheckPairs(certificate, most, a, b));
   std::vector<BigVector> differences;
   for (const v1::VertexPair& pair : certificate.pairs()) {
     differences.push_back(b.scale * a.World(pair.index_a()) - a.scale * b.World(pair.index_b()));
@@ -202,26 +203,26 @@ absl::StatusOr<std::vector<BigVector>> DifferencesOf(const v1::Certificate& give
 
 absl::Status CheckExactly(v1::Relation relation, const v1::Certificate& certificate,
                           const ExactHull& a, const ExactHull& b) {
-  if (absl::Status s = CheckRelation(relation); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(CheckRelation(relation));
   if (a.radius + b.radius > 0) return CheckRounded(relation, certificate, a, b);
   if (relation == v1::RELATION_TOUCHING) return CheckTouching(certificate, a, b);
   if (relation == v1::RELATION_OVERLAPPING) return CheckOverlapping(certificate, a, b);
   BigVector n;
-  if (absl::Status s = ReadDirection(certificate, &n); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(ReadDirection(certificate, &n));
   if (GapSign(a, b, n) > 0) return absl::OkStatus();
   return ProofFails("the direction does not separate: max n.A >= min n.B");
 }
 
 absl::Status CheckCertificate(v1::Relation relation, const v1::Certificate& certificate,
                               const PlacedVertices& a, const PlacedVertices& b) {
-  if (absl::Status s = CheckRelation(relation); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(CheckRelation(relation));
   if (a.xyz.empty() || b.xyz.empty()) {
     if (relation == v1::RELATION_SEPARATED) return absl::OkStatus();
     return ProofFails("a hull is empty, and so separated from everything");
   }
   CommonExponent lengths;
   for (const PlacedVertices* hull : {&a, &b}) {
-    if (absl::Status s = CheckPlacement(*hull); !s.ok()) return s;
+    HULLD_RETURN_IF_ERROR(CheckPlacement(*hull));
     IncludeLengths(*hull, &lengths);
   }
   return CheckExactly(relation, certificate, ExactHull(a, ToIntegers(a.xyz, lengths), lengths),

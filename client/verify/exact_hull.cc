@@ -8,6 +8,7 @@
 #include <string>
 
 #include "client/check.h"
+#include "client/status_macros.h"
 
 namespace hulld {
 namespace {
@@ -27,9 +28,9 @@ absl::Status CheckFinite(std::span<const double> numbers, const char* what) {
 }
 
 absl::Status CheckPose(const v1::Pose& pose) {
-  if (absl::Status s = CheckFinite(Translation(pose), "a translation"); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(CheckFinite(Translation(pose), "a translation"));
   const std::array<double, 4> q = Rotation(pose);
-  if (absl::Status s = CheckFinite(q, "a rotation"); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(CheckFinite(q, "a rotation"));
   if (q != std::array<double, 4>{0, 0, 0, 0}) return absl::OkStatus();
   return absl::FailedPreconditionError("a rotation is zero");
 }
@@ -90,9 +91,9 @@ bool AreFinite(std::span<const double> numbers) {
 }
 
 absl::Status CheckPlacement(const PlacedVertices& hull) {
-  if (absl::Status s = CheckFinite(hull.xyz, "a hull"); !s.ok()) return s;
-  if (absl::Status s = CheckPose(hull.pose); !s.ok()) return s;
-  if (absl::Status s = CheckFinite(hull.radii, "a radius"); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(CheckFinite(hull.xyz, "a hull"));
+  HULLD_RETURN_IF_ERROR(CheckPose(hull.pose));
+  HULLD_RETURN_IF_ERROR(CheckFinite(hull.radii, "a radius"));
   if (hull.radii[0] < 0 || hull.radii[1] < 0) {
     return absl::FailedPreconditionError("a radius is negative");
   }

@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "client/status_macros.h"
 #include "client/verify/certificate_check.h"
 
 namespace hulld {
@@ -322,7 +323,7 @@ absl::Status CheckInterval(const MovingPair& pair, const v1::SeparatedInterval& 
   if (has_end) {
     v1::Certificate direction;
     *direction.mutable_direction() = interval.end_direction();
-    if (absl::Status s = ReadDirection(direction, &end.n, &end.exponent); !s.ok()) return s;
+    HULLD_RETURN_IF_ERROR(ReadDirection(direction, &end.n, &end.exponent));
     end.offset = interval.end_offset();
   }
   return CheckPlane(pair, {start, end}, times, may_end);
@@ -389,10 +390,10 @@ absl::Status CheckBriefContact(const MovingPair& pair, const v1::FirstContact& c
                                const v1::Certificate& certificate) {
   std::vector<BigVector> span;
   for (const double time : {contact.separated_until(), contact.contact_time()}) {
-    const auto differences =
-        DifferencesOf(certificate, kMaxTouchingPairs, pair.a.HullAt(time), pair.b.HullAt(time));
-    if (!differences.ok()) return differences.status();
-    span.insert(span.end(), differences->begin(), differences->end());
+    HULLD_ASSIGN_OR_RETURN(
+        const auto differences,
+        DifferencesOf(certificate, kMaxTouchingPairs, pair.a.HullAt(time), pair.b.HullAt(time)));
+    span.insert(span.end(), differences.begin(), differences.end());
   }
   if (HoldsOriginInside(span) || HoldsOriginOnBoundary(span)) return absl::OkStatus();
   return ProofFails("the vertex pairs show no common point up to contact_time");
@@ -417,7 +418,7 @@ absl::Status CheckContact(v1::Relation relation, const MovingPair& pair,
 // Includes the lengths of both ends.
 absl::Status IncludeMotion(const MovingVertices& hull, CommonExponent* lengths) {
   for (const PlacedVertices& end : {hull.start, PlacedVertices{{}, hull.end}}) {
-    if (absl::Status s = CheckPlacement(end); !s.ok()) return s;
+    HULLD_RETURN_IF_ERROR(CheckPlacement(end));
     IncludeLengths(end, lengths);
   }
   return absl::OkStatus();
@@ -434,7 +435,7 @@ class MovingPieces {
   absl::Status Include(CommonExponent* lengths) const {
     for (size_t i = 0; i < size(); ++i) {
       if (empty(i)) continue;
-      if (absl::Status s = IncludeMotion(pieces_[i], lengths); !s.ok()) return s;
+      HULLD_RETURN_IF_ERROR(IncludeMotion(pieces_[i], lengths));
     }
     return absl::OkStatus();
   }
@@ -467,20 +468,20 @@ double MaxTimeError(const v1::Wanted& wanted) {
 absl::Status CheckFirstContact(v1::Relation relation, const v1::FirstContact& contact,
                                const v1::Certificate& at_contact, const MovingVertices& a,
                                const MovingVertices& b, double max_time_error) {
-  if (absl::Status s = CheckRelation(relation); !s.ok()) return s;
-  if (absl::Status s = CheckTimes(relation, contact); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(CheckRelation(relation));
+  HULLD_RETURN_IF_ERROR(CheckTimes(relation, contact));
   if (a.start.xyz.empty() || b.start.xyz.empty()) {
     if (relation == v1::RELATION_SEPARATED) return absl::OkStatus();
     return ProofFails("a hull is empty, and so separated from everything");
   }
   CommonExponent lengths;
   for (const MovingVertices* hull : {&a, &b}) {
-    if (absl::Status s = IncludeMotion(*hull, &lengths); !s.ok()) return s;
+    HULLD_RETURN_IF_ERROR(IncludeMotion(*hull, &lengths));
   }
   const ExactMotion motion_a(a, lengths);
   const ExactMotion motion_b(b, lengths);
   const MovingPair pair = {motion_a, motion_b, lengths};
-  if (absl::Status s = CheckIntervals(pair, contact, contact.intervals()); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(CheckIntervals(pair, contact, contact.intervals()));
   if (relation == v1::RELATION_SEPARATED) return absl::OkStatus();
   const absl::Status checked = CheckContact(relation, pair, contact, at_contact);
   if (!checked.ok()) return ProofFails(absl::StrCat("contact: ", checked.message()));
@@ -491,13 +492,13 @@ absl::Status CheckFirstContact(v1::Relation relation, const v1::FirstContact& co
                                const PieceCertificates& certificates,
                                std::span<const MovingVertices> a, std::span<const MovingVertices> b,
                                double max_time_error) {
-  if (absl::Status s = CheckRelation(relation); !s.ok()) return s;
-  if (absl::Status s = CheckTimes(relation, contact); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(CheckRelation(relation));
+  HULLD_RETURN_IF_ERROR(CheckTimes(relation, contact));
   MovingPieces pieces_a(a);
   MovingPieces pieces_b(b);
   CommonExponent lengths;
-  if (absl::Status s = pieces_a.Include(&lengths); !s.ok()) return s;
-  if (absl::Status s = pieces_b.Include(&lengths); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(pieces_a.Include(&lengths));
+  HULLD_RETURN_IF_ERROR(pieces_b.Include(&lengths));
   std::set<std::pair<uint32_t, uint32_t>> proven;
   v1::Relation shown = v1::RELATION_SEPARATED;
   for (const v1::PieceCertificate& of : certificates) {

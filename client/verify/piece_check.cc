@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "client/check.h"
+#include "client/status_macros.h"
 #include "client/verify/certificate_check.h"
 
 namespace hulld {
@@ -192,17 +193,16 @@ absl::Status CheckUncertifiedPairs(const Pairs& proven, ExactPieces* a, ExactPie
 absl::Status CheckPieceCertificates(v1::Relation relation, const PieceCertificates& certificates,
                                     std::span<const PlacedVertices> a,
                                     std::span<const PlacedVertices> b) {
-  if (absl::Status s = CheckRelation(relation); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(CheckRelation(relation));
   ExactPieces exact_a(a);
   ExactPieces exact_b(b);
   CommonExponent lengths;
-  if (absl::Status s = exact_a.Check("A", &lengths); !s.ok()) return s;
-  if (absl::Status s = exact_b.Check("B", &lengths); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(exact_a.Check("A", &lengths));
+  HULLD_RETURN_IF_ERROR(exact_b.Check("B", &lengths));
   Pairs proven;
   bool is_shown = relation == v1::RELATION_SEPARATED;
   for (const v1::PieceCertificate& of : certificates) {
-    absl::Status s = CheckOne(relation, of, &exact_a, &exact_b, lengths, &proven);
-    if (!s.ok()) return s;
+    HULLD_RETURN_IF_ERROR(CheckOne(relation, of, &exact_a, &exact_b, lengths, &proven));
     is_shown |= of.relation() == relation;
   }
   if (!is_shown) {

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "client/status_macros.h"
 #include "client/verify/exact_vector.h"
 #include "client/verify/triangle_tree.h"
 
@@ -118,7 +119,7 @@ class AskedHull {
       hull.unit_.push_back(measure.unit.ToUnit(p));
       hull.known_.insert(Key(p));
     }
-    if (absl::Status s = hull.AddTriangles(mesh); !s.ok()) return s;
+    HULLD_RETURN_IF_ERROR(hull.AddTriangles(mesh));
     hull.is_flat_ = mesh.facet_sizes.size() < 2;
     hull.tree_.emplace(hull.unit_, hull.triangles_);
     hull.FindApexes();
@@ -279,7 +280,7 @@ bool IsSameVersion(const v1::MeshHeader& a, const v1::MeshHeader& b) {
 
 absl::Status CheckSimplification(const v1::Simplification& asked, const HullMesh& hull,
                                  const HullMesh& simplified) {
-  if (absl::Status s = CheckHeader(asked, simplified); !s.ok()) return s;
+  HULLD_RETURN_IF_ERROR(CheckHeader(asked, simplified));
   if (hull.xyz.empty() != simplified.xyz.empty()) {
     return NotShown("one of hull and simplification is empty, and the other is not");
   }
@@ -291,13 +292,11 @@ absl::Status CheckSimplification(const v1::Simplification& asked, const HullMesh
   }
   const double error = simplified.header.error();
   const Measure measure(hull, simplified, error);
-  const auto of_hull = AskedHull::Make(hull, measure);
-  if (!of_hull.ok()) return of_hull.status();
-  const auto of_simplified = AskedHull::Make(simplified, measure);
-  if (!of_simplified.ok()) return of_simplified.status();
+  HULLD_ASSIGN_OR_RETURN(const auto of_hull, AskedHull::Make(hull, measure));
+  HULLD_ASSIGN_OR_RETURN(const auto of_simplified, AskedHull::Make(simplified, measure));
   return asked.side() == v1::SIMPLIFICATION_SIDE_OUTSIDE
-             ? CheckOutside(hull, simplified, error, *of_hull, *of_simplified)
-             : CheckInside(hull, simplified, error, *of_hull, *of_simplified);
+             ? CheckOutside(hull, simplified, error, of_hull, of_simplified)
+             : CheckInside(hull, simplified, error, of_hull, of_simplified);
 }
 
 absl::StatusOr<VerifiedMesh> GetSimplificationVerified(
@@ -308,21 +307,17 @@ absl::StatusOr<VerifiedMesh> GetSimplificationVerified(
   }
   VerifiedMesh verified;
   for (int attempt = 0; attempt < kSimplificationReadAttempts; ++attempt) {
-    absl::StatusOr<HullMesh> simplified = client.GetHullMesh(request, on_part);
-    if (!simplified.ok()) return simplified.status();
-    verified.mesh = *std::move(simplified);
-    const absl::StatusOr<HullMesh> hull = client.GetHullMesh(request.hull_id());
-    if (!hull.ok()) return hull.status();
-    if (!IsSameVersion(hull->header, verified.mesh.header)) {
+    HULLD_ASSIGN_OR_RETURN(verified.mesh, client.GetHullMesh(request, on_part));
+    HULLD_ASSIGN_OR_RETURN(const HullMesh hull, client.GetHullMesh(request.hull_id()));
+    if (!IsSameVersion(hull.header, verified.mesh.header)) {
       verified.verification = {
           Verdict::kMoved,
           absl::StrCat("hull ", request.hull_id(), " is at revision ",
-                       hull->header.hull().revision(), "; the simplification is of revision ",
+                       hull.header.hull().revision(), "; the simplification is of revision ",
                        verified.mesh.header.hull().revision())};
       continue;
     }
-    const absl::Status checked =
-        CheckSimplification(request.simplification(), *hull, verified.mesh);
+    const absl::Status checked = CheckSimplification(request.simplification(), hull, verified.mesh);
     verified.verification = checked.ok()
                                 ? Verification{Verdict::kValid, ""}
                                 : Verification{Verdict::kInvalid, std::string(checked.message())};

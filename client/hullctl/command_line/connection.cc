@@ -11,6 +11,7 @@
 #include "client/hullctl/command_line/arguments.h"
 #include "client/hullctl/context/context_file.h"
 #include "client/server_address.h"
+#include "client/status_macros.h"
 
 namespace hulld {
 namespace {
@@ -31,15 +32,13 @@ NamedContext ContextInForce(const Invocation& invocation, const ContextFile& fil
 }
 
 absl::StatusOr<std::vector<SettingsLayer>> LayersOf(const Invocation& invocation) {
-  auto environment = SettingsOfEnvironment();
-  if (!environment.ok()) return environment.status();
-  auto file = ReadContextFile();
-  if (!file.ok()) return file.status();
+  HULLD_ASSIGN_OR_RETURN(auto environment, SettingsOfEnvironment());
+  HULLD_ASSIGN_OR_RETURN(auto file, ReadContextFile());
   std::vector<SettingsLayer> layers = {{"", invocation.flags, false},
-                                       {"environment", *std::move(environment), false}};
-  const NamedContext named = ContextInForce(invocation, *file);
+                                       {"environment", std::move(environment), false}};
+  const NamedContext named = ContextInForce(invocation, file);
   if (named.name.empty()) return layers;
-  auto context = FindContext(*file, named.name);
+  auto context = FindContext(file, named.name);
   if (!context.ok()) {
     return absl::InvalidArgumentError(absl::StrCat(named.source, ": ", context.status().message()));
   }
@@ -88,18 +87,15 @@ void AddConnectionOptions(Command command, Invocation* invocation) {
 }
 
 absl::Status ResolveConnection(Invocation* invocation) {
-  auto layers = LayersOf(*invocation);
-  if (!layers.ok()) return layers.status();
-  invocation->connection = Combine(*layers);
+  HULLD_ASSIGN_OR_RETURN(auto layers, LayersOf(*invocation));
+  invocation->connection = Combine(layers);
   const ChosenSetting& server = invocation->connection.at("server");
   if (const absl::Status valid = ValidateServer(server.value); !valid.ok()) {
     return absl::InvalidArgumentError(
         absl::StrCat("server of ", server.source, ": ", valid.message()));
   }
   invocation->server = server.value;
-  auto security = ReadSecurity(invocation->connection);
-  if (!security.ok()) return security.status();
-  invocation->security = *std::move(security);
+  HULLD_ASSIGN_OR_RETURN(invocation->security, ReadSecurity(invocation->connection));
   return ValidateSecurity(invocation->security, invocation->server);
 }
 

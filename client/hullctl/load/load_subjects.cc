@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "client/hullctl/load/point_generator.h"
+#include "client/status_macros.h"
 
 namespace hulld {
 namespace {
@@ -104,19 +105,18 @@ class LoadSubjects::LoadClient {
   }
 
   absl::StatusOr<uint64_t> Check(uint64_t i) const {
-    const auto response = client_.CheckCollision(checks_[i % kDistinctRequests]);
-    if (!response.ok()) return response.status();
+    HULLD_ASSIGN_OR_RETURN(const auto response,
+                           client_.CheckCollision(checks_[i % kDistinctRequests]));
     return 1;
   }
 
   absl::StatusOr<uint64_t> Batch() const {
     uint64_t answered = 0;
-    const absl::Status status = client_.BatchCheckCollisions(
+    HULLD_RETURN_IF_ERROR(client_.BatchCheckCollisions(
         batch_, [&answered](const v1::BatchCheckCollisionsResponse& part) {
           answered += static_cast<uint64_t>(part.columns().relations_size());
           return absl::OkStatus();
-        });
-    if (!status.ok()) return status;
+        }));
     return answered;
   }
 
@@ -127,9 +127,7 @@ class LoadSubjects::LoadClient {
       AppendOptions options;
       options.create_if_absent = true;
       options.max_in_flight_chunks = 1;
-      auto opened = client_.OpenAppend(append_id_, options);
-      if (!opened.ok()) return opened.status();
-      appender_ = *std::move(opened);
+      HULLD_ASSIGN_OR_RETURN(appender_, client_.OpenAppend(append_id_, options));
     }
     status = appender_->Append(points_);
     if (status.ok()) return settings_.points;
@@ -157,11 +155,10 @@ std::string LoadSubjects::HullId(uint64_t i) const {
 }
 
 absl::Status LoadSubjects::Create(const std::atomic<bool>& stop) {
-  const auto there = client_.ListAllHulls(settings_.prefix, 1);
-  if (!there.ok()) return there.status();
-  if (there->hulls_size() > 0) {
+  HULLD_ASSIGN_OR_RETURN(const auto there, client_.ListAllHulls(settings_.prefix, 1));
+  if (there.hulls_size() > 0) {
     return absl::FailedPreconditionError(absl::StrCat(
-        "hull \"", there->hulls(0).hull_id(), "\" already exists, and the load would delete it; ",
+        "hull \"", there.hulls(0).hull_id(), "\" already exists, and the load would delete it; ",
         "choose another --prefix"));
   }
   owns_prefix_ = true;
@@ -170,11 +167,9 @@ absl::Status LoadSubjects::Create(const std::atomic<bool>& stop) {
     if (stop) return absl::CancelledError("interrupted");
     AppendOptions options;
     options.create_if_absent = true;
-    auto appender = client_.OpenAppend(HullId(i), options);
-    if (!appender.ok()) return appender.status();
-    absl::Status status =
-        (*appender)->Append(MakePoints(Shape::kSphere, settings_.vertices, i + 1));
-    if (status.ok()) status = (*appender)->Finish();
+    HULLD_ASSIGN_OR_RETURN(auto appender, client_.OpenAppend(HullId(i), options));
+    absl::Status status = appender->Append(MakePoints(Shape::kSphere, settings_.vertices, i + 1));
+    if (status.ok()) status = appender->Finish();
     if (!status.ok()) return status;
   }
   return absl::OkStatus();

@@ -13,6 +13,7 @@
 #include "client/hullctl/body/hull_segment.h"
 #include "client/hullctl/command_line/point_input.h"
 #include "client/hullctl/local/local_server.h"
+#include "client/status_macros.h"
 
 namespace hulld {
 namespace {
@@ -55,18 +56,16 @@ absl::Status Register(const Client& client, const std::string& hull_id, const Fe
 
 // Returns the hulls of the points from each feed, built by a local server.
 absl::StatusOr<std::vector<HullMesh>> Build(const std::vector<Feed>& feeds) {
-  const auto server = LocalServer::Start();
-  if (!server.ok()) return server.status();
+  HULLD_ASSIGN_OR_RETURN(const auto server, LocalServer::Start());
   ClientOptions options;
-  options.server = (*server)->address();
+  options.server = server->address();
   options.own_connection = true;
   const Client client(options);
   std::vector<HullMesh> hulls;
   for (const Feed& feed : feeds) {
-    if (absl::Status status = Register(client, "shape", feed); !status.ok()) return status;
-    auto mesh = client.GetHullMesh("shape");
-    if (!mesh.ok()) return mesh.status();
-    hulls.push_back(*std::move(mesh));
+    HULLD_RETURN_IF_ERROR(Register(client, "shape", feed));
+    HULLD_ASSIGN_OR_RETURN(auto mesh, client.GetHullMesh("shape"));
+    hulls.push_back(std::move(mesh));
   }
   return hulls;
 }
@@ -100,9 +99,8 @@ bool IsShapeFile(const std::string& argument) {
 }
 
 absl::Status SetShape(const Invocation& run, const std::string& path, v1::Placement* placement) {
-  const auto format = PointFormatOfPath(path);
-  if (!format.ok()) return format.status();
-  const ReadRequest request{path, *format, {}, {}};
+  HULLD_ASSIGN_OR_RETURN(const auto format, PointFormatOfPath(path));
+  const ReadRequest request{path, format, {}, {}};
   v1::PointBlock points;
   absl::Status read = ReadDistinctPoints(request, &points);
   placement->clear_hull_id();
@@ -111,8 +109,7 @@ absl::Status SetShape(const Invocation& run, const std::string& path, v1::Placem
     if (run.local) {
       // The full path, to distinguish files in different folders.
       const std::string id = HullSegment(request.path);
-      const absl::Status status = Register(run.MakeClient(), id, FeedOf(request));
-      if (!status.ok()) return status;
+      HULLD_RETURN_IF_ERROR(Register(run.MakeClient(), id, FeedOf(request)));
       placement->set_hull_id(id);
       return absl::OkStatus();
     }
@@ -123,13 +120,11 @@ absl::Status SetShape(const Invocation& run, const std::string& path, v1::Placem
 }
 
 absl::StatusOr<HullMesh> HullOfFile(const std::string& path) {
-  const auto format = PointFormatOfPath(path);
-  if (!format.ok()) return format.status();
-  ReadRequest request{path, *format, {}, {}};
+  HULLD_ASSIGN_OR_RETURN(const auto format, PointFormatOfPath(path));
+  ReadRequest request{path, format, {}, {}};
   request.options.skip_nonfinite = true;
-  auto hulls = Build({FeedOf(request)});
-  if (!hulls.ok()) return hulls.status();
-  return std::move(hulls->front());
+  HULLD_ASSIGN_OR_RETURN(auto hulls, Build({FeedOf(request)}));
+  return std::move(hulls.front());
 }
 
 absl::StatusOr<std::vector<HullMesh>> HullsOfShapes(const std::vector<v1::PointBlock>& shapes) {

@@ -15,6 +15,7 @@
 #include "client/hullctl/printing/progress_bar.h"
 #include "client/hullctl/printing/table.h"
 #include "client/point_messages.h"
+#include "client/status_macros.h"
 
 namespace hulld {
 namespace {
@@ -30,9 +31,8 @@ absl::StatusOr<std::vector<NamedPart>> ReadAll(const std::string& body_id,
   std::vector<NamedPart> all;
   std::set<std::string> taken;
   for (const std::string& file : files) {
-    auto parts = ReadParts(file, split);
-    if (!parts.ok()) return parts.status();
-    for (MeshPart& part : *parts) {
+    HULLD_ASSIGN_OR_RETURN(auto parts, ReadParts(file, split));
+    for (MeshPart& part : parts) {
       const std::string name = part.name.empty() ? "part" : part.name;
       const std::string segment = UniqueHullSegment(name, &taken);
       all.push_back({absl::StrCat(body_id, "/", segment), std::move(part)});
@@ -44,17 +44,15 @@ absl::StatusOr<std::vector<NamedPart>> ReadAll(const std::string& body_id,
 absl::StatusOr<AppendTotals> Send(const Client& client, const NamedPart& named, bool create) {
   AppendOptions options;
   options.create_if_absent = create;
-  auto stream = client.OpenAppend(named.hull_id, options);
-  if (!stream.ok()) return stream.status();
+  HULLD_ASSIGN_OR_RETURN(auto stream, client.OpenAppend(named.hull_id, options));
   std::vector<double> xyz;
   for (const auto& vertex : named.part.mesh.vertices) {
     xyz.insert(xyz.end(), vertex.begin(), vertex.end());
   }
-  const absl::Status sent = SendInMessages(
-      xyz, [&](v1::PointBlock points) { return (*stream)->Append(std::move(points)); });
-  if (!sent.ok()) return sent;
-  if (absl::Status finished = (*stream)->Finish(); !finished.ok()) return finished;
-  return (*stream)->totals();
+  HULLD_RETURN_IF_ERROR(SendInMessages(
+      xyz, [&](v1::PointBlock points) { return stream->Append(std::move(points)); }));
+  HULLD_RETURN_IF_ERROR(stream->Finish());
+  return stream->totals();
 }
 
 // Returns the body of the parts as it was before the append; without an ID if it does not exist.
@@ -97,10 +95,9 @@ absl::Status CheckPieces(const Client& client, const v1::GetBodyResponse& body,
                          const std::string& id, const std::vector<NamedPart>& parts) {
   const auto request = Extended(body, id, parts);
   if (!request.has_value()) return absl::OkStatus();
-  const auto status = client.GetStatus();
-  if (!status.ok()) return status.status();
+  HULLD_ASSIGN_OR_RETURN(const auto status, client.GetStatus());
   const auto pieces = static_cast<uint64_t>(request->pieces_size());
-  const uint64_t limit = status->limits().max_pieces_per_body();
+  const uint64_t limit = status.limits().max_pieces_per_body();
   if (pieces <= limit) return absl::OkStatus();
   return absl::FailedPreconditionError(
       absl::StrCat("body ", Quoted(id), " would have ", pieces, " pieces; the limit is ", limit,

@@ -8,6 +8,7 @@
 #include "client/formats/byte_source.h"
 #include "client/formats/text_number.h"
 #include "client/hullctl/printing/json.h"
+#include "client/status_macros.h"
 #include "hulld/v1/collision.pb.h"
 #include "hulld/v1/hull.pb.h"
 
@@ -31,8 +32,7 @@ absl::Status AddLine(const std::string& line, bool is_first, RecordedWatch* watc
     if (parsed.ok()) Keep(of_hulls, watch);
     return parsed;
   }
-  const absl::Status parsed = ParseJson(line, UnknownFields::kRefuse, &of_pairs);
-  if (!parsed.ok()) return parsed;
+  HULLD_RETURN_IF_ERROR(ParseJson(line, UnknownFields::kRefuse, &of_pairs));
   Keep(of_pairs, watch);
   for (const v1::CollisionEvent& event : of_pairs.events()) {
     const uint64_t highest = std::max(event.placement_a(), event.placement_b());
@@ -44,25 +44,24 @@ absl::Status AddLine(const std::string& line, bool is_first, RecordedWatch* watc
 }  // namespace
 
 absl::StatusOr<RecordedWatch> ReadRecordedWatch(const std::string& path) {
-  const auto source = ByteSource::Open(path);
-  if (!source.ok()) return source.status();
+  HULLD_ASSIGN_OR_RETURN(const auto source, ByteSource::Open(path));
   RecordedWatch watch;
   bool is_first = true;
-  for (std::string_view line; (*source)->ReadLine(&line);) {
+  for (std::string_view line; source->ReadLine(&line);) {
     const std::string_view text = Trim(line);
     if (text.empty()) continue;
     if (watch.messages.size() == kMaxRecordedMessages) {
-      return (*source)->ErrorAtLine(absl::StrCat("the viewer plays up to ", kMaxRecordedMessages,
-                                                 " messages with events; remove the rest"));
+      return source->ErrorAtLine(absl::StrCat("the viewer plays up to ", kMaxRecordedMessages,
+                                              " messages with events; remove the rest"));
     }
     const absl::Status added = AddLine(std::string(text), is_first, &watch);
     if (!added.ok()) {
-      return (*source)->ErrorAtLine(absl::StrCat("not a line of 'hullctl watch --output json': ",
-                                                 std::string(added.message())));
+      return source->ErrorAtLine(absl::StrCat("not a line of 'hullctl watch --output json': ",
+                                              std::string(added.message())));
     }
     is_first = false;
   }
-  if (!(*source)->status().ok()) return (*source)->status();
+  if (!source->status().ok()) return source->status();
   if (!watch.messages.empty()) return watch;
   return absl::InvalidArgumentError(
       absl::StrCat(path, ": contains no events; write it with 'hullctl watch --output json'"));

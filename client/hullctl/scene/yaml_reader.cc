@@ -12,6 +12,7 @@
 
 #include "client/formats/text_number.h"
 #include "client/hullctl/help/suggestion.h"
+#include "client/status_macros.h"
 
 namespace hulld {
 namespace {
@@ -164,9 +165,8 @@ absl::StatusOr<std::vector<double>> YamlReader::Numbers(const YAML::Node& node,
   }
   std::vector<double> numbers;
   for (const YAML::Node& entry : node) {
-    const auto number = Number(entry, key);
-    if (!number.ok()) return number.status();
-    numbers.push_back(*number);
+    HULLD_ASSIGN_OR_RETURN(const auto number, Number(entry, key));
+    numbers.push_back(number);
   }
   if (counts.empty() || std::find(counts.begin(), counts.end(), numbers.size()) != counts.end()) {
     return numbers;
@@ -180,9 +180,8 @@ absl::StatusOr<std::vector<std::string>> YamlReader::Texts(const YAML::Node& nod
   if (!node.IsSequence()) return ErrorAt(node, absl::StrCat(key, " must be a list, as in [a, b]"));
   std::vector<std::string> texts;
   for (const YAML::Node& entry : node) {
-    auto text = Text(entry, key);
-    if (!text.ok()) return text.status();
-    texts.push_back(*std::move(text));
+    HULLD_ASSIGN_OR_RETURN(auto text, Text(entry, key));
+    texts.push_back(std::move(text));
   }
   return texts;
 }

@@ -13,6 +13,7 @@
 #include "client/hullctl/view/answer_feed.h"
 #include "client/hullctl/view/geometry_feed.h"
 #include "client/hullctl/view/protocol.h"
+#include "client/status_macros.h"
 
 namespace hulld {
 namespace {
@@ -56,12 +57,11 @@ absl::StatusOr<std::string> AllPairs(const Client& client, const std::vector<Vie
   for (uint32_t a = 0; a < objects.size(); ++a) {
     for (uint32_t b = a + 1; b < objects.size(); ++b) {
       if (objects[a].hull_id.empty() || objects[b].hull_id.empty()) continue;
-      const auto response = Proven(client, [&](bool certificate) {
-        return PairRequest(objects[a], objects[b], certificate);
-      });
-      if (!response.ok()) return response.status();
+      HULLD_ASSIGN_OR_RETURN(const auto response, Proven(client, [&](bool certificate) {
+                               return PairRequest(objects[a], objects[b], certificate);
+                             }));
       absl::StrAppend(&answers, answers.size() > 1 ? "," : "",
-                      PairAnswerJson({a, b}, objects[a], objects[b], 0, *response));
+                      PairAnswerJson({a, b}, objects[a], objects[b], 0, response));
     }
   }
   return answers + "]";
@@ -92,10 +92,10 @@ std::string AllMotions(const Client& client, const std::vector<ViewObject>& obje
 absl::StatusOr<std::string> State(const Client& client, const ViewScene& scene,
                                   const std::vector<ViewObject>& objects, double time,
                                   bool with_answers) {
-  const auto collisions = SceneAnswerJson(client, scene.rules, scene.pairs, objects, 0, 0);
-  if (!collisions.ok()) return collisions.status();
-  const auto answers = AllPairs(client, with_answers ? objects : std::vector<ViewObject>());
-  if (!answers.ok()) return answers.status();
+  HULLD_ASSIGN_OR_RETURN(const auto collisions,
+                         SceneAnswerJson(client, scene.rules, scene.pairs, objects, 0, 0));
+  HULLD_ASSIGN_OR_RETURN(const auto answers,
+                         AllPairs(client, with_answers ? objects : std::vector<ViewObject>()));
   std::vector<Pose7> poses;
   for (const ViewObject& object : objects) {
     if (object.is_jointed) poses.push_back(object.pose);
@@ -103,8 +103,8 @@ absl::StatusOr<std::string> State(const Client& client, const ViewScene& scene,
   return JsonObject()
       .AddJson("time", ShortestText(time))
       .AddJson("poses", PosesJson(poses))
-      .AddJson("collisions", *collisions)
-      .AddJson("answers", *answers)
+      .AddJson("collisions", collisions)
+      .AddJson("answers", answers)
       .Close();
 }
 
@@ -127,16 +127,14 @@ absl::StatusOr<std::string> AllStates(const Client& client, const ViewScene& sce
       if (object.motion) object.pose = PoseAt(*object.motion, time);
     }
     if (!scene.joints.waypoints.empty()) {
-      const auto poses = scene.joints.poses(scene.joints.waypoints[i]);
-      if (!poses.ok()) return poses.status();
-      auto pose = poses->begin();
+      HULLD_ASSIGN_OR_RETURN(const auto poses, scene.joints.poses(scene.joints.waypoints[i]));
+      auto pose = poses.begin();
       for (ViewObject& object : objects) {
         if (object.is_jointed) object.pose = *pose++;
       }
     }
-    const auto state = State(client, scene, objects, time, with_answers);
-    if (!state.ok()) return state.status();
-    absl::StrAppend(&states, i > 0 ? "," : "", *state);
+    HULLD_ASSIGN_OR_RETURN(const auto state, State(client, scene, objects, time, with_answers));
+    absl::StrAppend(&states, i > 0 ? "," : "", state);
   }
   return states + "]";
 }
@@ -151,14 +149,14 @@ absl::StatusOr<std::string> RecordScene(const ViewProgram& program, const ViewSc
   }
   const bool is_small = PairCount(scene) <= kMaxRecordedAnswers;
   const std::string motions = is_small ? AllMotions(program.client, scene.objects, &times) : "[]";
-  const auto states = AllStates(program.client, scene, {times.begin(), times.end()});
-  if (!states.ok()) return states.status();
+  HULLD_ASSIGN_OR_RETURN(const auto states,
+                         AllStates(program.client, scene, {times.begin(), times.end()}));
   return JsonObject()
       .AddJson("hello", HelloMessage(program))
       .AddJson("scene", SceneMessage(scene, 1))
       .AddJson("frames", AllFrames(program.client, scene))
       .AddJson("motions", motions)
-      .AddJson("states", *states)
+      .AddJson("states", states)
       .Close();
 }
 

@@ -9,6 +9,7 @@
 #include "client/hullctl/body/hull_segment.h"
 #include "client/hullctl/command_line/point_input.h"
 #include "client/hullctl/view/bridge/random_name.h"
+#include "client/status_macros.h"
 
 namespace hulld {
 namespace {
@@ -22,9 +23,8 @@ TemporaryHulls::~TemporaryHulls() {
 }
 
 absl::StatusOr<std::string> TemporaryHulls::AddFile(const std::string& path) {
-  const auto format = PointFormatOfPath(path);
-  if (!format.ok()) return format.status();
-  ReadRequest request{path, *format, {}, {}};
+  HULLD_ASSIGN_OR_RETURN(const auto format, PointFormatOfPath(path));
+  ReadRequest request{path, format, {}, {}};
   request.options.skip_nonfinite = true;
   std::string name = std::filesystem::path(path).filename().string();
   for (const std::string& id : ids_) {
@@ -39,16 +39,14 @@ absl::StatusOr<std::string> TemporaryHulls::AddFile(const std::string& path) {
 absl::StatusOr<std::string> TemporaryHulls::Add(
     const std::string& name, const std::function<absl::Status(const Client::PointSink&)>& feed) {
   if (prefix_.empty()) {
-    const auto random = RandomHex(kPrefixBytes);
-    if (!random.ok()) return random.status();
-    prefix_ = absl::StrCat("view/", *random, "/");
+    HULLD_ASSIGN_OR_RETURN(const auto random, RandomHex(kPrefixBytes));
+    prefix_ = absl::StrCat("view/", random, "/");
   }
   const std::string id = prefix_ + HullSegment(name);
   v1::ReplaceOpen open;
   open.set_hull_id(id);
   open.set_create_if_absent(true);
-  const auto replaced = client_.ReplaceHull(open, feed);
-  if (!replaced.ok()) return replaced.status();
+  HULLD_ASSIGN_OR_RETURN(const auto replaced, client_.ReplaceHull(open, feed));
   if (std::find(ids_.begin(), ids_.end(), id) == ids_.end()) ids_.push_back(id);
   return id;
 }

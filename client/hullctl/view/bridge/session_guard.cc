@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "client/hullctl/view/bridge/random_name.h"
+#include "client/status_macros.h"
 
 namespace hulld {
 namespace {
@@ -29,11 +30,9 @@ SessionGuard::Decision RefuseRequest(int http_status, std::string reason) {
 }  // namespace
 
 absl::StatusOr<SessionGuard> SessionGuard::Create(uint16_t port) {
-  auto token = RandomHex(kSecretBytes);
-  if (!token.ok()) return token.status();
-  auto session = RandomHex(kSecretBytes);
-  if (!session.ok()) return session.status();
-  return SessionGuard(port, *std::move(token), *std::move(session));
+  HULLD_ASSIGN_OR_RETURN(auto token, RandomHex(kSecretBytes));
+  HULLD_ASSIGN_OR_RETURN(auto session, RandomHex(kSecretBytes));
+  return SessionGuard(port, std::move(token), std::move(session));
 }
 
 SessionGuard::SessionGuard(uint16_t port, std::string one_time_token, std::string session)
