@@ -38,7 +38,7 @@ std::vector<Sample> Samples() {
                    "property list uchar uchar l\nelement vertex 2\nproperty float x\n"
                    "property float y\nproperty float z\nend_header\n")
            .append("\x02zz\x00", 4)
-           .append(packed)},
+           .append(packed, 0, 24)},
       {PointFormat::kPcd,
        "VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 2\nHEIGHT 1\n"
        "POINTS 2\nDATA ascii\n1 2 3\n4 5 6\n"},
