@@ -22,13 +22,30 @@ void AddShape(const v1::PointBlock& points, v1::PackedPlacements* packed) {
 }
 
 void AddPose(const v1::Pose& pose, google::protobuf::RepeatedField<double>* poses) {
-  const v1::Quaternion& q = pose.rotation();
-  const v1::Vector3& t = pose.translation();
-  poses->Add(pose.has_rotation() ? q.w() : 1);
-  for (const double number : {q.x(), q.y(), q.z(), t.x(), t.y(), t.z()}) poses->Add(number);
+  for (const double number : NumbersOf(pose)) poses->Add(number);
 }
 
 }  // namespace
+
+std::array<double, 7> NumbersOf(const v1::Pose& pose) {
+  const v1::Quaternion& q = pose.rotation();
+  const v1::Vector3& t = pose.translation();
+  return {pose.has_rotation() ? q.w() : 1, q.x(), q.y(), q.z(), t.x(), t.y(), t.z()};
+}
+
+v1::Pose PoseOf(std::span<const double, 7> numbers) {
+  v1::Pose pose;
+  v1::Quaternion& q = *pose.mutable_rotation();
+  q.set_w(numbers[0]);
+  q.set_x(numbers[1]);
+  q.set_y(numbers[2]);
+  q.set_z(numbers[3]);
+  v1::Vector3& t = *pose.mutable_translation();
+  t.set_x(numbers[4]);
+  t.set_y(numbers[5]);
+  t.set_z(numbers[6]);
+  return pose;
+}
 
 v1::PackedPlacements PackPlacements(
     const google::protobuf::RepeatedPtrField<v1::Placement>& placements) {

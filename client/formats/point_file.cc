@@ -105,6 +105,17 @@ absl::StatusOr<ReadCounts> ReadPoints(const ReadRequest& request, const BlockRec
   return absl::InvalidArgumentError(absl::StrCat((*source)->name(), ": contains no points"));
 }
 
+absl::StatusOr<std::vector<double>> ReadAllPoints(const ReadRequest& request) {
+  std::vector<double> xyz;
+  const auto counts = ReadPoints(request, [&xyz](const PointChunk& block) {
+    xyz.insert(xyz.end(), block.xyz.begin(), block.xyz.end());
+    xyz.insert(xyz.end(), block.xyz_float.begin(), block.xyz_float.end());
+    return absl::OkStatus();
+  });
+  if (!counts.ok()) return counts.status();
+  return xyz;
+}
+
 absl::Status AddTextPoint(const ByteSource& source, std::string_view text, PointCollector* points) {
   std::array<double, 3> xyz;
   for (size_t i = 0; i < 3; ++i) {

@@ -44,6 +44,9 @@ struct ReadRequest {
 };
 absl::StatusOr<ReadCounts> ReadPoints(const ReadRequest& request, const BlockReceiver& receive);
 
+// Returns all points of a file, n x 3. Errors are those of ReadPoints.
+absl::StatusOr<std::vector<double>> ReadAllPoints(const ReadRequest& request);
+
 // Readers of the formats. They stop at the first error; the caller flushes the collector.
 absl::Status ReadObj(ByteSource* source, PointCollector* points);
 absl::Status ReadOff(ByteSource* source, PointCollector* points);

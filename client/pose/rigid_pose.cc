@@ -1,6 +1,8 @@
 #include "client/pose/rigid_pose.h"
 
+#include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "client/pose/vector3.h"
 
@@ -33,6 +35,17 @@ RigidPose RotationOf(const Vector& roll_pitch_yaw) {
   const RigidPose pitch = RotationAbout({0, 1, 0}, roll_pitch_yaw[1]);
   const RigidPose yaw = RotationAbout({0, 0, 1}, roll_pitch_yaw[2]);
   return Compose(yaw, Compose(pitch, roll));
+}
+
+RigidPose OnShorterPath(const RigidPose& start, RigidPose end) {
+  // Makes the largest component 1, so that products do not overflow.
+  const auto largest = [](const RigidPose& pose) {
+    return std::max({std::abs(pose[0]), std::abs(pose[1]), std::abs(pose[2]), std::abs(pose[3])});
+  };
+  double cosine = 0;
+  for (size_t i = 0; i < 4; ++i) cosine += start[i] / largest(start) * (end[i] / largest(end));
+  if (cosine < 0) std::transform(end.begin(), end.begin() + 4, end.begin(), std::negate<>());
+  return end;
 }
 
 RigidPose Compose(const RigidPose& X_AB, const RigidPose& X_BC) {

@@ -19,6 +19,10 @@ RigidPose RotationAbout(const std::array<double, 3>& axis, double angle);
 // order, as in URDF: R = Rz(yaw) Ry(pitch) Rx(roll).
 RigidPose RotationOf(const std::array<double, 3>& roll_pitch_yaw);
 
+// Returns the end of a motion, with the sign of its quaternion that makes the path from the start
+// shorter: both signs are the same rotation. Requires nonzero quaternions.
+RigidPose OnShorterPath(const RigidPose& start, RigidPose end);
+
 // Returns X_AC = X_AB X_BC, rounded: each number has an error of a few units of roundoff of the
 // lengths involved. If X_AB has no rotation (its quaternion is (w, 0, 0, 0)), only the sum of the
 // translations is rounded. Requires nonzero quaternions; a zero quaternion yields NaN.

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "client/formats/point_file.h"
 
@@ -66,12 +67,9 @@ absl::StatusOr<ShapeHull> MeshHull(const CollisionShape& shape, const std::strin
   ShapeHull hull;
   ReadRequest request{file, *format, {}, {}};
   request.options.scale = shape.scale;
-  const auto counts = ReadPoints(request, [&](const PointChunk& block) {
-    hull.xyz.insert(hull.xyz.end(), block.xyz.begin(), block.xyz.end());
-    hull.xyz.insert(hull.xyz.end(), block.xyz_float.begin(), block.xyz_float.end());
-    return absl::OkStatus();
-  });
-  if (!counts.ok()) return counts.status();
+  auto xyz = ReadAllPoints(request);
+  if (!xyz.ok()) return xyz.status();
+  hull.xyz = *std::move(xyz);
   return hull;
 }
 

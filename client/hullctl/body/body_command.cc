@@ -30,8 +30,8 @@ ExitCode PutBody(const Invocation& run, const BodyArguments& arguments) {
   request.set_body_id(arguments.body_id);
   if (arguments.if_revision) request.set_if_revision(*arguments.if_revision);
   if (arguments.pieces.empty() == arguments.file.empty()) {
-    return run.FailUsage(absl::InvalidArgumentError(
-        "pass the pieces as HULL[@POSE][:RADIUS] or with --pieces FILE, but not both"));
+    return run.FailUsage(
+        "pass the pieces as HULL[@POSE][:RADIUS] or with --pieces FILE, but not both");
   }
   for (const std::string& text : arguments.pieces) {
     const absl::StatusOr<v1::Placement> piece = ParsePiece(text);
@@ -44,11 +44,7 @@ ExitCode PutBody(const Invocation& run, const BodyArguments& arguments) {
   }
   const auto response = run.MakeClient().PutBody(request);
   if (!response.ok()) return run.Fail(response.status());
-  if (run.json()) {
-    run.out << MessageJson(*response) << "\n";
-  } else if (run.names()) {
-    run.out << response->body().body_id() << "\n";
-  } else {
+  if (!run.PrintForPrograms(*response, response->body().body_id())) {
     run.out << response->body().body_id() << (response->created() ? " created" : " replaced")
             << " at revision " << response->body().revision() << ", "
             << Counted(response->body().piece_count(), "piece") << "\n";
@@ -75,8 +71,7 @@ ExitCode GetBody(const Invocation& run, const BodyArguments& arguments) {
       response->pieces(), [](const v1::Placement& piece) { return piece.radius() > 0; });
   std::vector<std::string> head = {"PIECE", "HULL", "POSE"};
   if (has_radii) head.push_back("RADIUS");
-  for (std::string& title : head) title = run.paint(Hue::kHeading, title);
-  table.Row(head);
+  table.Head(run.paint, head);
   for (int i = 0; i < response->pieces_size(); ++i) {
     const v1::Placement& piece = response->pieces(i);
     const std::string pose = PoseText(piece.pose());
@@ -97,9 +92,7 @@ ExitCode ListBodies(const Invocation& run, const BodyArguments& arguments) {
     for (const v1::BodyInfo& body : response->bodies()) run.out << body.body_id() << "\n";
   } else {
     Table table;
-    std::vector<std::string> head = {"BODY", "PIECES", "REVISION"};
-    for (std::string& title : head) title = run.paint(Hue::kHeading, title);
-    table.Row(head);
+    table.Head(run.paint, {"BODY", "PIECES", "REVISION"});
     for (const v1::BodyInfo& body : response->bodies()) {
       table.Row({body.body_id(), body.damaged() ? "damaged" : std::to_string(body.piece_count()),
                  std::to_string(body.revision())});
@@ -116,11 +109,7 @@ ExitCode DeleteBody(const Invocation& run, const BodyArguments& arguments) {
   const auto response = run.MakeClient().DeleteBody(arguments.body_id, arguments.if_revision);
   if (absl::IsNotFound(response.status()) && arguments.if_exists) return ExitCode::kDone;
   if (!response.ok()) return run.Fail(response.status());
-  if (run.json()) {
-    run.out << MessageJson(*response) << "\n";
-  } else if (run.names()) {
-    run.out << arguments.body_id << "\n";
-  } else {
+  if (!run.PrintForPrograms(*response, arguments.body_id)) {
     run.out << arguments.body_id << " deleted at revision " << response->header().revision()
             << "\n";
   }

@@ -62,19 +62,6 @@ absl::Status ReadPieces(const std::string& path, Pieces* pieces) {
   return absl::OkStatus();
 }
 
-RigidPose NumbersOf(const v1::Pose& pose) {
-  RigidPose numbers = kNoMotion;
-  if (pose.has_rotation()) {
-    const v1::Quaternion& q = pose.rotation();
-    numbers = {q.w(), q.x(), q.y(), q.z(), 0, 0, 0};
-  }
-  const v1::Vector3& t = pose.translation();
-  numbers[4] = t.x();
-  numbers[5] = t.y();
-  numbers[6] = t.z();
-  return numbers;
-}
-
 std::string PoseText(const v1::Pose& pose) {
   const v1::Quaternion& q = pose.rotation();
   const v1::Vector3& t = pose.translation();

@@ -7,7 +7,6 @@
 
 #include <string>
 
-#include "client/pose/rigid_pose.h"
 #include "hulld/v1/collision.pb.h"
 #include "hulld/v1/geometry.pb.h"
 
@@ -21,9 +20,6 @@ absl::StatusOr<v1::Placement> ParsePiece(const std::string& text);
 // Adds the pieces of a JSON file, as written by 'hullctl body get --output json': {"pieces":[...]};
 // "-" is standard input. INVALID_ARGUMENT and NOT_FOUND name the file.
 absl::Status ReadPieces(const std::string& path, Pieces* pieces);
-
-// Returns the numbers of a pose; missing parts are the identity.
-RigidPose NumbersOf(const v1::Pose& pose);
 
 // Returns a pose in the form of ParsePose, with as few numbers as possible; empty for the
 // identity.

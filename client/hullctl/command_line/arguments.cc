@@ -8,6 +8,9 @@
 #include <vector>
 
 #include "client/formats/text_number.h"
+#include "client/packed_placements.h"
+#include "client/pose/rigid_pose.h"
+#include "client/status_macros.h"
 
 namespace hulld {
 namespace {
@@ -32,25 +35,6 @@ absl::StatusOr<std::vector<double>> ParseNumbers(std::string_view text) {
     if (comma == std::string_view::npos) return numbers;
     text.remove_prefix(comma + 1);
   }
-}
-
-// Returns the rotation of a pose; the identity if it has none.
-v1::Quaternion GivenRotation(const v1::Pose& pose) {
-  if (pose.has_rotation()) return pose.rotation();
-  v1::Quaternion none;
-  none.set_w(1);
-  return none;
-}
-
-// Makes the largest component 1, so that products do not overflow.
-v1::Quaternion Scaled(v1::Quaternion q) {
-  const double largest =
-      std::max({std::abs(q.w()), std::abs(q.x()), std::abs(q.y()), std::abs(q.z())});
-  q.set_w(q.w() / largest);
-  q.set_x(q.x() / largest);
-  q.set_y(q.y() / largest);
-  q.set_z(q.z() / largest);
-  return q;
 }
 
 }  // namespace
@@ -80,61 +64,36 @@ absl::StatusOr<std::chrono::milliseconds> ParseDuration(const std::string& text)
 }
 
 absl::StatusOr<std::array<double, 3>> ParseTriple(const std::string& text) {
-  absl::StatusOr<std::vector<double>> numbers = ParseNumbers(text);
-  if (!numbers.ok()) return numbers.status();
-  if (numbers->size() != 3) {
+  HULLD_ASSIGN_OR_RETURN(std::vector<double> numbers, ParseNumbers(text));
+  if (numbers.size() != 3) {
     return absl::InvalidArgumentError(
         absl::StrCat(Quoted(text), " is not three comma-separated numbers x,y,z"));
   }
-  return std::array<double, 3>{(*numbers)[0], (*numbers)[1], (*numbers)[2]};
+  return std::array<double, 3>{numbers[0], numbers[1], numbers[2]};
 }
 
-absl::StatusOr<v1::Pose> PoseFromNumbers(const std::vector<double>& numbers) {
+absl::StatusOr<v1::Pose> ParsePose(const std::string& text) {
+  HULLD_ASSIGN_OR_RETURN(const auto numbers, ParseNumbers(text));
   if (numbers.size() != 3 && numbers.size() != 7) {
     return absl::InvalidArgumentError(absl::StrCat(
         "a pose has 3 comma-separated numbers, x,y,z, or 7, w,x,y,z,x,y,z; got ", numbers.size()));
   }
-  v1::Pose pose;
-  const double* t = numbers.data();
-  if (numbers.size() == 7) {
-    v1::Quaternion& q = *pose.mutable_rotation();
-    q.set_w(t[0]);
-    q.set_x(t[1]);
-    q.set_y(t[2]);
-    q.set_z(t[3]);
-    if (t[0] == 0 && t[1] == 0 && t[2] == 0 && t[3] == 0) {
-      return absl::InvalidArgumentError(
-          "the quaternion w,x,y,z is zero; use 1,0,0,0 for no rotation");
-    }
-    t += 4;
+  RigidPose all = kNoMotion;
+  std::copy(numbers.begin(), numbers.end(), all.end() - numbers.size());
+  if (std::all_of(all.begin(), all.begin() + 4, [](double number) { return number == 0; })) {
+    return absl::InvalidArgumentError(
+        "the quaternion w,x,y,z is zero; use 1,0,0,0 for no rotation");
   }
-  pose.mutable_translation()->set_x(t[0]);
-  pose.mutable_translation()->set_y(t[1]);
-  pose.mutable_translation()->set_z(t[2]);
+  v1::Pose pose = PoseOf(all);
+  if (numbers.size() == 3) pose.clear_rotation();
   return pose;
 }
 
-absl::StatusOr<v1::Pose> ParsePose(const std::string& text) {
-  absl::StatusOr<std::vector<double>> numbers = ParseNumbers(text);
-  if (!numbers.ok()) return numbers.status();
-  return PoseFromNumbers(*numbers);
-}
-
 void SetMotion(const v1::Pose& end, v1::Placement* placement) {
-  const v1::Quaternion start = GivenRotation(placement->pose());
-  v1::Quaternion q = end.has_rotation() ? end.rotation() : start;
-  const v1::Quaternion from = Scaled(start);
-  const v1::Quaternion to = Scaled(q);
-  const bool is_longer =
-      from.w() * to.w() + from.x() * to.x() + from.y() * to.y() + from.z() * to.z() < 0;
-  if (is_longer) {
-    q.set_w(-q.w());
-    q.set_x(-q.x());
-    q.set_y(-q.y());
-    q.set_z(-q.z());
-  }
-  *placement->mutable_end_pose() = end;
-  *placement->mutable_end_pose()->mutable_rotation() = q;
+  const RigidPose start = NumbersOf(placement->pose());
+  RigidPose numbers = NumbersOf(end);
+  if (!end.has_rotation()) std::copy_n(start.begin(), 4, numbers.begin());
+  *placement->mutable_end_pose() = PoseOf(OnShorterPath(start, numbers));
 }
 
 }  // namespace hulld

@@ -24,9 +24,6 @@ absl::StatusOr<std::array<double, 3>> ParseTriple(const std::string& text);
 // nearest double.
 absl::StatusOr<v1::Pose> ParsePose(const std::string& text);
 
-// Creates a pose from 3 or 7 numbers.
-absl::StatusOr<v1::Pose> PoseFromNumbers(const std::vector<double>& numbers);
-
 // Moves a placement to `end`, on the shorter of the two paths between the rotations. Without a
 // rotation, `end` keeps that of the start.
 void SetMotion(const v1::Pose& end, v1::Placement* placement);

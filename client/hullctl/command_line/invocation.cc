@@ -4,6 +4,7 @@
 
 #include "client/calls/grpc_status.h"
 #include "client/hullctl/command_line/tls_diagnosis.h"
+#include "client/hullctl/printing/json.h"
 
 namespace hulld {
 namespace {
@@ -87,6 +88,13 @@ Client Invocation::MakeClient() const {
   return Client(std::move(options));
 }
 
+bool Invocation::PrintForPrograms(const google::protobuf::Message& message,
+                                  const std::string& name) const {
+  if (json()) out << MessageJson(message) << "\n";
+  if (names()) out << name << "\n";
+  return json() || names();
+}
+
 ExitCode Invocation::Fail(const absl::Status& status) const {
   err << "hullctl: " << Explain(status, server, timeout, security) << "\n";
   const bool unreachable = absl::IsUnavailable(status) || absl::IsDeadlineExceeded(status);
@@ -94,7 +102,11 @@ ExitCode Invocation::Fail(const absl::Status& status) const {
 }
 
 ExitCode Invocation::FailUsage(const absl::Status& status) const {
-  err << "hullctl: " << std::string(status.message().data(), status.message().size()) << "\n";
+  return FailUsage(std::string(status.message()));
+}
+
+ExitCode Invocation::FailUsage(const std::string& message) const {
+  err << "hullctl: " << message << "\n";
   return ExitCode::kUsage;
 }
 

@@ -2,6 +2,7 @@
 #define HULLD_CLIENT_HULLCTL_COMMAND_LINE_INVOCATION_H_
 
 #include <absl/status/status.h>
+#include <google/protobuf/message.h>
 
 #include <functional>
 #include <map>
@@ -75,10 +76,15 @@ struct Invocation {
 
   Client MakeClient() const;
 
+  // With --output json or name, prints the message or the name. Returns false with other formats,
+  // which the command prints itself.
+  bool PrintForPrograms(const google::protobuf::Message& message, const std::string& name) const;
+
   // Reports a failed call with its remedy; returns the exit code for its status.
   ExitCode Fail(const absl::Status& status) const;
   // Reports errors of input and output files and arguments.
   ExitCode FailUsage(const absl::Status& status) const;
+  ExitCode FailUsage(const std::string& message) const;
   // Reports why a certificate is not valid; returns the exit code for the verdict.
   ExitCode Judge(const Verification& verification) const;
 };

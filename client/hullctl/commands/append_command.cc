@@ -205,12 +205,11 @@ ExitCode FailAppend(const Invocation& run, const AppendArguments& arguments,
   }
   if (outcome.stream.ok()) return run.FailUsage(outcome.file);
   if (!absl::IsNotFound(outcome.stream)) return run.Fail(outcome.stream);
-  const std::string message(outcome.stream.message().data(), outcome.stream.message().size());
   const char* const advice =
       arguments.create
           ? "the files contain no points to create it from; 'hullctl create' creates an empty hull"
           : "create it with --create, or see 'hullctl list'";
-  run.err << "hullctl: " << message << " (" << advice << ")\n";
+  run.err << "hullctl: " << outcome.stream.message() << " (" << advice << ")\n";
   return arguments.create ? ExitCode::kUsage : ExitCode::kRequestFailed;
 }
 
@@ -228,8 +227,8 @@ ExitCode SplitAppend(const Invocation& run, const AppendArguments& arguments) {
   const PointInput& input = arguments.input;
   if (arguments.resume || !arguments.writer.empty() || input.skip_nonfinite || input.skip_zero ||
       !input.format.empty() || input.chunk_points != 0) {
-    return run.FailUsage(absl::InvalidArgumentError(
-        "--split can be combined only with --create; the format follows from the file name"));
+    return run.FailUsage(
+        "--split can be combined only with --create; the format follows from the file name");
   }
   const SplitBy split = arguments.split == "names" ? SplitBy::kName : SplitBy::kComponent;
   return AppendParts(run, arguments.hull_id, input.files, split, arguments.create);

@@ -289,13 +289,8 @@ class BatchRun {
 };
 
 ExitCode Batch(const Invocation& run, const BatchArguments& arguments) {
-  const auto source = ByteSource::Open(arguments.file);
-  if (!source.ok()) return run.FailUsage(source.status());
-  const auto scene = ReadScene(source->get(), FormFor(arguments.details));
+  const auto scene = ReadWholeScene(arguments.file, "batch", FormFor(arguments.details));
   if (!scene.ok()) return run.FailUsage(scene.status());
-  if (absl::Status rest = RefuseUpdates(source->get(), "batch"); !rest.ok()) {
-    return run.FailUsage(rest);
-  }
   return AnswerPairs(run, arguments.file, *scene, arguments.details, arguments.colliding);
 }
 
@@ -309,9 +304,9 @@ ExitCode AnswerPairs(const Invocation& run, const std::string& file, const Scene
                      const QueryDetails& details, bool colliding) {
   const BatchArguments arguments{file, details, colliding};
   if (colliding && run.json()) {
-    return run.FailUsage(absl::InvalidArgumentError(
+    return run.FailUsage(
         "--colliding cannot be combined with --output json, which prints every pair; use 'hullctl "
-        "scene' to find colliding pairs"));
+        "scene' to find colliding pairs");
   }
   const auto pairs = PairsOf(scene, file);
   if (!pairs.ok()) return run.FailUsage(pairs.status());

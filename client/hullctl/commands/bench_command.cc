@@ -1,9 +1,9 @@
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
-#include <signal.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <map>
 #include <memory>
@@ -13,6 +13,7 @@
 #include "client/formats/text_number.h"
 #include "client/hullctl/command_line/arguments.h"
 #include "client/hullctl/command_line/freshness_options.h"
+#include "client/hullctl/command_line/interrupt.h"
 #include "client/hullctl/commands/commands.h"
 #include "client/hullctl/load/load.h"
 #include "client/hullctl/load/load_subjects.h"
@@ -54,36 +55,6 @@ const char* ItemName(LoadMode mode) {
   }
   return "pairs and points";
 }
-
-// Records SIGINT and SIGTERM while it exists, so that hulls can be deleted. A second signal ends
-// the program as usual.
-class InterruptWatch {
- public:
-  InterruptWatch() {
-    interrupted_ = false;
-    struct sigaction action = {};
-    action.sa_handler = [](int) { interrupted_ = true; };
-    action.sa_flags = SA_RESETHAND;
-    sigaction(SIGINT, &action, &old_int_);
-    sigaction(SIGTERM, &action, &old_term_);
-  }
-  InterruptWatch(const InterruptWatch&) = delete;
-  InterruptWatch& operator=(const InterruptWatch&) = delete;
-  ~InterruptWatch() {
-    sigaction(SIGINT, &old_int_, nullptr);
-    sigaction(SIGTERM, &old_term_, nullptr);
-  }
-
-  static const std::atomic<bool>& interrupted() { return interrupted_; }
-
- private:
-  static std::atomic<bool> interrupted_;
-  static_assert(std::atomic<bool>::is_always_lock_free);
-  struct sigaction old_int_ = {};
-  struct sigaction old_term_ = {};
-};
-
-std::atomic<bool> InterruptWatch::interrupted_ = false;
 
 std::string RandomName() {
   std::random_device device;
@@ -156,15 +127,6 @@ void PrintLoadTable(const LoadArguments& arguments, const LoadResult& result, st
 
 std::string Number(double value) { return ShortestText(value); }
 
-std::string JsonArray(const std::vector<std::string>& elements) {
-  std::string text = "[";
-  for (const std::string& element : elements) {
-    if (text.size() > 1) text += ",";
-    text += element;
-  }
-  return text + "]";
-}
-
 void PrintLoadJson(const LoadArguments& arguments, const std::string& mode, bool interrupted,
                    const LoadResult& result, std::ostream& out) {
   const double seconds = Seconds(result.elapsed);
@@ -218,10 +180,11 @@ std::string ModeName(LoadMode mode) {
   return "";
 }
 
-LoadResult Drive(const Invocation& run, const LoadArguments& arguments, LoadSubjects* subjects) {
+LoadResult Drive(const Invocation& run, const LoadArguments& arguments,
+                 const std::atomic<bool>& interrupted, LoadSubjects* subjects) {
   constexpr uint64_t kWhole = 1000000;
   ProgressBar bar(run.err, run.shows_progress, "requests", kWhole);
-  return RunLoad(arguments.plan, subjects->MakeClients(), InterruptWatch::interrupted(),
+  return RunLoad(arguments.plan, subjects->MakeClients(), interrupted,
                  [&bar](double share, uint64_t requests) {
                    bar.Update(static_cast<uint64_t>(share * static_cast<double>(kWhole)), requests);
                  });
@@ -239,7 +202,9 @@ ExitCode LoadExitCode(const LoadResult& result) {
 }
 
 ExitCode Load(const Invocation& run, LoadArguments arguments) {
-  const InterruptWatch watch;
+  // Recorded, so that the hulls can be deleted.
+  std::atomic<bool> interrupted = false;
+  const Interrupt interrupt([&interrupted] { interrupted = true; });
   if (!arguments.plan.duration && !arguments.plan.requests)
     arguments.plan.duration = kDefaultDuration;
   std::string& prefix = arguments.settings.prefix;
@@ -250,10 +215,9 @@ ExitCode Load(const Invocation& run, LoadArguments arguments) {
   connection.retry.max_attempts = 1;
   connection.own_connection = true;
   LoadSubjects subjects(arguments.settings, connection);
-  const absl::Status created = subjects.Create(InterruptWatch::interrupted());
+  const absl::Status created = subjects.Create(interrupted);
   LoadResult result;
-  if (created.ok()) result = Drive(run, arguments, &subjects);
-  const bool interrupted = InterruptWatch::interrupted();
+  if (created.ok()) result = Drive(run, arguments, interrupted, &subjects);
   const absl::Status deleted = subjects.Delete();
   if (created.ok() && run.json()) {
     PrintLoadJson(arguments, ModeName(arguments.settings.mode), interrupted, result, run.out);

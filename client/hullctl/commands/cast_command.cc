@@ -47,7 +47,7 @@ double Leading(const std::string& digits, size_t dropped) {
              : std::strtod(digits.substr(0, digits.size() - dropped).c_str(), nullptr);
 }
 
-Triple NumbersOf(const v1::SeparatedInterval& interval) {
+Triple DirectionOf(const v1::SeparatedInterval& interval) {
   if (!interval.has_integer_direction()) {
     const v1::Vector3& n =
         interval.has_end_direction() ? interval.end_direction() : interval.direction();
@@ -65,7 +65,7 @@ Triple NumbersOf(const v1::SeparatedInterval& interval) {
 // within rounding of an edge or vertex.
 std::optional<Triple> NormalOf(const v1::FirstContact& contact) {
   if (contact.intervals().empty()) return std::nullopt;
-  Triple n = NumbersOf(*contact.intervals().rbegin());
+  Triple n = DirectionOf(*contact.intervals().rbegin());
   const double largest = std::max({std::abs(n[0]), std::abs(n[1]), std::abs(n[2])});
   for (double& x : n) x /= largest;
   const double length = std::hypot(n[0], n[1], n[2]);
@@ -183,9 +183,7 @@ void Print(const Invocation& run, const Hits& found) {
     return;
   }
   Table table;
-  std::vector<std::string> head = {"HULL", "TIME", "POINT", "NORMAL"};
-  for (std::string& title : head) title = run.paint(Hue::kHeading, title);
-  table.Row(head);
+  table.Head(run.paint, {"HULL", "TIME", "POINT", "NORMAL"});
   for (const Hit& hit : found.hits) {
     table.Row({hit.hull_id, ShortestText(hit.time), NumbersText(hit.point, " "),
                hit.normal ? NumbersText(*hit.normal, " ") : "-"});
@@ -196,8 +194,7 @@ void Print(const Invocation& run, const Hits& found) {
 ExitCode CastRay(const Invocation& run, const CastArguments& arguments) {
   const Ray ray(arguments);
   if (!ray.HasFiniteEnd()) {
-    return run.FailUsage(absl::InvalidArgumentError(
-        "ORIGIN + DIRECTION exceeds the largest double; shorten the ray"));
+    return run.FailUsage("ORIGIN + DIRECTION exceeds the largest double; shorten the ray");
   }
   const Client client = run.MakeClient();
   const auto list = client.ListAllHulls(arguments.prefix);

@@ -194,11 +194,7 @@ std::string RecordJson(const v1::CheckCollisionRequest& request,
 void PrintAnswer(const Invocation& run, const PairArguments& arguments,
                  const v1::CheckCollisionRequest& request,
                  const v1::CheckCollisionResponse& response, const Verification* verification) {
-  if (run.json()) {
-    run.out << MessageJson(response) << "\n";
-  } else if (run.names()) {
-    run.out << RelationText(response.relation()) << "\n";
-  } else {
+  if (!run.PrintForPrograms(response, RelationText(response.relation()))) {
     PrintAnswerTable(run, arguments, request, response, verification);
   }
 }
@@ -362,8 +358,7 @@ ExitCode CheckPair(const Invocation& run, const PairArguments& arguments) {
 ExitCode Check(const Invocation& run, const PairArguments& arguments) {
   if (!arguments.points.empty()) return CheckPointsOfFile(run, arguments);
   if (!arguments.b.empty()) return CheckPair(run, arguments);
-  return run.FailUsage(absl::InvalidArgumentError(
-      "B is required: 'hullctl check A B', or 'hullctl check A --points FILE'"));
+  return run.FailUsage("B is required: 'hullctl check A B', or 'hullctl check A --points FILE'");
 }
 
 void AddPoseOption(Command command, const std::string& name, const char* help,

@@ -48,18 +48,15 @@ std::string ContextJson(const std::string& name, const ConnectionSettings& setti
 }
 
 ExitCode Add(const Invocation& run, const ContextArguments& arguments) {
-  const auto usage = [&run](const std::string& what) {
-    return run.FailUsage(absl::InvalidArgumentError(what));
-  };
   if (const std::string problem = ContextNameProblem(arguments.name); !problem.empty()) {
-    return usage(absl::StrCat(Quoted(arguments.name), ": ", problem));
+    return run.FailUsage(absl::StrCat(Quoted(arguments.name), ": ", problem));
   }
   if (!run.flags.contains("server"))
-    return usage("a context needs a server; pass --server HOST:PORT");
+    return run.FailUsage("a context needs a server; pass --server HOST:PORT");
   auto file = ReadContextFile();
   if (!file.ok()) return run.FailUsage(file.status());
   if (file->contexts.contains(arguments.name) && !arguments.replace) {
-    return usage(
+    return run.FailUsage(
         absl::StrCat("context ", arguments.name, " already exists; pass --replace to replace it"));
   }
   const ConnectionSettings settings = Lasting(run.flags);
@@ -84,7 +81,7 @@ ExitCode Add(const Invocation& run, const ContextArguments& arguments) {
 
 ExitCode Use(const Invocation& run, const ContextArguments& arguments) {
   if (arguments.none == !arguments.name.empty()) {
-    return run.FailUsage(absl::InvalidArgumentError("pass the name of a context, or --none"));
+    return run.FailUsage("pass the name of a context, or --none");
   }
   auto file = ReadContextFile();
   if (!file.ok()) return run.FailUsage(file.status());
@@ -107,9 +104,7 @@ ExitCode ListContexts(const Invocation& run) {
   const auto file = ReadContextFile();
   if (!file.ok()) return run.FailUsage(file.status());
   Table table;
-  std::vector<std::string> head = {"CONTEXT", "SERVER", "TLS", "TOKEN FILE", "USED"};
-  for (std::string& title : head) title = run.paint(Hue::kHeading, title);
-  table.Row(head);
+  table.Head(run.paint, {"CONTEXT", "SERVER", "TLS", "TOKEN FILE", "USED"});
   for (const auto& [name, settings] : file->contexts) {
     const bool current = name == file->current;
     if (run.json()) {

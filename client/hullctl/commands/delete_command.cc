@@ -60,11 +60,7 @@ absl::StatusOr<std::vector<DeletionTarget>> Choose(const Client& client,
 
 void PrintDeleted(const Invocation& run, const std::string& hull_id,
                   const v1::DeleteHullResponse& response) {
-  if (run.json()) {
-    run.out << MessageJson(response) << "\n";
-  } else if (run.names()) {
-    run.out << hull_id << "\n";
-  } else {
+  if (!run.PrintForPrograms(response, hull_id)) {
     run.out << hull_id << " deleted at revision " << response.header().revision() << "\n";
   }
 }
@@ -97,17 +93,14 @@ ExitCode DeleteAll(const Invocation& run, const Client& client, const DeleteArgu
 }
 
 ExitCode DeleteHulls(const Invocation& run, const DeleteArguments& arguments) {
-  const auto usage = [&run](const char* what) {
-    return run.FailUsage(absl::InvalidArgumentError(what));
-  };
   if (arguments.hull_ids.empty() == !arguments.has_prefix) {
-    return usage("pass either the IDs of the hulls to delete or --prefix");
+    return run.FailUsage("pass either the IDs of the hulls to delete or --prefix");
   }
   if (arguments.if_revision && arguments.hull_ids.size() != 1) {
-    return usage("--if-revision requires exactly one hull");
+    return run.FailUsage("--if-revision requires exactly one hull");
   }
   if (arguments.has_prefix && arguments.prefix.empty()) {
-    return usage("refusing to delete all hulls on the server: --prefix is empty");
+    return run.FailUsage("refusing to delete all hulls on the server: --prefix is empty");
   }
   const Client client = run.MakeClient();
   const auto targets = Choose(client, arguments);
@@ -118,7 +111,7 @@ ExitCode DeleteHulls(const Invocation& run, const DeleteArguments& arguments) {
   }
   const auto confirmed = IsConfirmed(run, arguments, *targets);
   if (!confirmed.ok()) return run.FailUsage(confirmed.status());
-  if (!*confirmed) return usage("cancelled; nothing was deleted");
+  if (!*confirmed) return run.FailUsage("cancelled; nothing was deleted");
   return DeleteAll(run, client, arguments, *targets);
 }
 

@@ -45,8 +45,8 @@ ExitCode Generate(const Invocation& run, const GenerateArguments& arguments) {
   CloudOptions cloud = arguments.cloud;
   cloud.shape = ShapeNames().at(arguments.shape);
   if (!IsFinite(cloud)) {
-    return run.FailUsage(absl::InvalidArgumentError(
-        "a coordinate exceeds the largest double; use a smaller --radius, --size, or --center"));
+    return run.FailUsage(
+        "a coordinate exceeds the largest double; use a smaller --radius, --size, or --center");
   }
   const bool to_file = !arguments.file.empty() && arguments.file != "-";
   ProgressBar bar(run.err, run.shows_progress && to_file, "points", cloud.count);

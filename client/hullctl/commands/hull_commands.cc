@@ -23,11 +23,7 @@ std::string CountsText(const v1::PointCounts& counts) {
 ExitCode Create(const Invocation& run, const std::string& hull_id, bool if_absent) {
   const auto response = run.MakeClient().CreateHull(hull_id, if_absent);
   if (!response.ok()) return run.Fail(response.status());
-  if (run.json()) {
-    run.out << MessageJson(*response) << "\n";
-  } else if (run.names()) {
-    run.out << hull_id << "\n";
-  } else {
+  if (!run.PrintForPrograms(*response, hull_id)) {
     run.out << hull_id << (response->created() ? " created" : " already exists") << " at revision "
             << response->hull().create_revision() << "\n";
   }
@@ -88,11 +84,7 @@ ExitCode GetHull(const Invocation& run, const v1::GetHullRequest& request) {
   const std::string& hull_id = request.hull_id();
   const auto response = run.MakeClient().GetHull(request);
   if (!response.ok()) return run.Fail(response.status());
-  if (run.json()) {
-    run.out << MessageJson(*response) << "\n";
-  } else if (run.names()) {
-    run.out << hull_id << "\n";
-  } else {
+  if (!run.PrintForPrograms(*response, hull_id)) {
     PrintHull(run, *response);
   }
   if (request.audit() && !response->audit().ok()) {

@@ -77,8 +77,7 @@ void PrintHullTable(const Invocation& run, const v1::ListHullsResponse& response
   Table table;
   std::vector<std::string> head = {"HULL", "DIMENSION", "VERTICES", "POINTS", "REVISION"};
   if (run.wide()) head.insert(head.end(), {"CREATED", "OUTSIDE", "DUPLICATE", "INSIDE", "STATE"});
-  for (std::string& title : head) title = run.paint(Hue::kHeading, title);
-  table.Row(head);
+  table.Head(run.paint, head);
   for (const v1::HullInfo& hull : response.hulls()) {
     const v1::PointCounts& counts = hull.counts();
     std::vector<std::string> row = {

@@ -81,19 +81,17 @@ ExitCode RefuseSimplification(const Invocation& run, const Verification& verific
 ExitCode Mesh(const Invocation& run, const MeshArguments& arguments) {
   const bool is_simplified = arguments.max_vertices > 0 || arguments.max_error > 0;
   if (arguments.outside && !is_simplified) {
-    return run.FailUsage(
-        absl::InvalidArgumentError("--outside needs --max-vertices, --max-error, or both"));
+    return run.FailUsage("--outside needs --max-vertices, --max-error, or both");
   }
   if (arguments.verify && !is_simplified) {
-    return run.FailUsage(absl::InvalidArgumentError(
-        "--verify checks a simplification; it needs --max-vertices, --max-error, or both"));
+    return run.FailUsage(
+        "--verify checks a simplification; it needs --max-vertices, --max-error, or both");
   }
   if (const auto format = PointFormatOfPath(arguments.file);
       format.ok() && *format != PointFormat::kObj) {
-    return run.FailUsage(absl::InvalidArgumentError(
-        absl::StrCat(arguments.file,
-                     ": meshes are written as OBJ; choose a name that ends in "
-                     ".obj, and convert the file")));
+    return run.FailUsage(absl::StrCat(arguments.file,
+                                      ": meshes are written as OBJ; choose a name that ends in "
+                                      ".obj, and convert the file"));
   }
   const auto fetched = Fetch(run, arguments);
   if (!fetched.ok()) return run.Fail(fetched.status());

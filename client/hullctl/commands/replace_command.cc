@@ -27,15 +27,8 @@ void PrintReplaced(const Invocation& run, const v1::ReplaceHullResponse& respons
   if (run.form != OutputForm::kTable && !run.wide()) {
     for (const std::string& text : skipped) run.err << "hullctl: " << text << " were skipped\n";
   }
-  if (run.json()) {
-    run.out << MessageJson(response) << "\n";
-    return;
-  }
   const v1::HullInfo& hull = response.hull();
-  if (run.names()) {
-    run.out << hull.hull_id() << "\n";
-    return;
-  }
+  if (run.PrintForPrograms(response, hull.hull_id())) return;
   Table table;
   table.Row({"hull", hull.hull_id() + (response.created() ? " created" : " replaced")})
       .Row({"points", std::to_string(hull.counts().received())});

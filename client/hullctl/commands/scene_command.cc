@@ -5,7 +5,6 @@
 #include <memory>
 #include <unordered_map>
 
-#include "client/formats/byte_source.h"
 #include "client/hullctl/command_line/freshness_options.h"
 #include "client/hullctl/command_line/query_options.h"
 #include "client/hullctl/commands/commands.h"
@@ -135,16 +134,6 @@ void AddChoiceOptions(Command command, SceneArguments* arguments) {
                   "Print a row for every pair of pieces found, not only for the deciding pair");
 }
 
-// Reads a scene that must end the source.
-absl::StatusOr<Scene> ReadWhole(const std::string& file, const QueryDetails& details) {
-  const auto source = ByteSource::Open(file);
-  if (!source.ok()) return source.status();
-  auto scene = ReadScene(source->get(), FormFor(details));
-  if (!scene.ok()) return scene.status();
-  if (absl::Status rest = RefuseUpdates(source->get(), "scene"); !rest.ok()) return rest;
-  return scene;
-}
-
 // Makes a scene find its nearest pairs.
 void SetNearest(uint32_t count, v1::FindCollisionsRequest* request) {
   request->set_limit(count);
@@ -170,22 +159,22 @@ ExitCode Find(const Invocation& run, const SceneArguments& arguments, Scene* rea
 
 ExitCode FindInScene(const Invocation& run, const SceneArguments& arguments) {
   if (arguments.file.empty()) {
-    return run.FailUsage(absl::InvalidArgumentError(
-        "FILE is required: 'hullctl scene FILE', or 'hullctl scene apply|check|diff|delete FILE'"));
+    return run.FailUsage(
+        "FILE is required: 'hullctl scene FILE', or 'hullctl scene apply|check|diff|delete FILE'");
   }
-  auto read = ReadWhole(arguments.file, arguments.details);
+  auto read = ReadWholeScene(arguments.file, "scene", FormFor(arguments.details));
   if (!read.ok()) return run.FailUsage(read.status());
   if (read->pairs.has_value()) {
-    return run.FailUsage(absl::InvalidArgumentError(
+    return run.FailUsage(
         absl::StrCat(arguments.file,
                      ": 'hullctl scene FILE' finds pairs itself, but the file names pairs; use "
-                     "'hullctl scene check' or 'hullctl batch', or remove the pairs")));
+                     "'hullctl scene check' or 'hullctl batch', or remove the pairs"));
   }
   return Find(run, arguments, &*read);
 }
 
 ExitCode CheckScene(const Invocation& run, const SceneArguments& arguments) {
-  auto read = ReadWhole(arguments.file, arguments.details);
+  auto read = ReadWholeScene(arguments.file, "scene", FormFor(arguments.details));
   if (!read.ok()) return run.FailUsage(read.status());
   if (read->pairs.has_value()) {
     const char* const option = arguments.nearest > 0   ? "--nearest"
@@ -193,9 +182,9 @@ ExitCode CheckScene(const Invocation& run, const SceneArguments& arguments) {
                                : arguments.every_piece ? "--every-piece"
                                                        : nullptr;
     if (option != nullptr) {
-      return run.FailUsage(absl::InvalidArgumentError(absl::StrCat(
+      return run.FailUsage(absl::StrCat(
           arguments.file, ": ", option,
-          " finds pairs itself, but the file names pairs; remove the option or the pairs")));
+          " finds pairs itself, but the file names pairs; remove the option or the pairs"));
     }
     return AnswerPairs(run, arguments.file, *read, arguments.details, /*colliding=*/false);
   }

@@ -66,11 +66,7 @@ ExitCode Status(const Invocation& run) {
   // A server without the health service is healthy if it answers.
   const bool serving = health.ok() || absl::IsUnimplemented(health);
   const char* const text = health.ok() ? "SERVING" : serving ? "UNKNOWN" : "NOT_SERVING";
-  if (run.json()) {
-    run.out << MessageJson(*status) << "\n";
-  } else if (run.names()) {
-    run.out << text << "\n";
-  } else {
+  if (!run.PrintForPrograms(*status, text)) {
     PrintStatus(run, *status, text);
   }
   if (serving) return ExitCode::kDone;

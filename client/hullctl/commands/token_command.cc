@@ -78,7 +78,7 @@ ExitCode NewToken(const Invocation& run, const TokenArguments& arguments) {
 ExitCode HashToken(const Invocation& run) {
   std::string token;
   if (!(std::cin >> token)) {
-    return run.FailUsage(absl::InvalidArgumentError("standard input contains no token"));
+    return run.FailUsage("standard input contains no token");
   }
   run.out << HashText(token) << "\n";
   return ExitCode::kDone;

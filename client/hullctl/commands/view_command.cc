@@ -26,6 +26,7 @@
 #include "client/hullctl/view/page_session.h"
 #include "client/hullctl/view/recording.h"
 #include "client/hullctl/view/temporary_hulls.h"
+#include "client/status_macros.h"
 
 namespace hulld {
 namespace {
@@ -157,9 +158,8 @@ class Viewing {
     for (const std::string& thing : things) {
       if (IsRobot(thing) || IsScene(thing)) {
         if (things.size() > 1) {
-          return run_.FailUsage(absl::InvalidArgumentError(
-              absl::StrCat(thing, " is a ", IsRobot(thing) ? "robot" : "scene",
-                           "; it cannot be combined with other arguments")));
+          return run_.FailUsage(absl::StrCat(thing, " is a ", IsRobot(thing) ? "robot" : "scene",
+                                             "; it cannot be combined with other arguments"));
         }
         const absl::Status added = IsRobot(thing) ? AddTheRobot(&scene) : AddTheScene(&scene);
         if (!added.ok()) return run_.FailUsage(added);
@@ -181,23 +181,22 @@ class Viewing {
 
   absl::Status AddTheRecording(ViewScene* scene) {
     const std::string& path = arguments_.recording;
-    auto watch = ReadRecordedWatch(path);
-    if (!watch.ok()) return watch.status();
+    HULLD_ASSIGN_OR_RETURN(auto watch, ReadRecordedWatch(path));
     const std::vector<std::string>& things = arguments_.things;
-    if (watch->is_of_pairs != (things.size() == 1 && IsScene(things[0]))) {
+    if (watch.is_of_pairs != (things.size() == 1 && IsScene(things[0]))) {
       return absl::InvalidArgumentError(absl::StrCat(
-          path, watch->is_of_pairs
+          path, watch.is_of_pairs
                     ? " records a watch of a scene; pass the scene file that was watched"
                     : " records a watch of hulls; pass their IDs or prefix, or no argument"));
     }
-    if (watch->is_of_pairs && watch->placements > scene->objects.size()) {
+    if (watch.is_of_pairs && watch.placements > scene->objects.size()) {
       return absl::InvalidArgumentError(absl::StrCat(
-          path, " records a watch of another scene: it contains placement ", watch->placements - 1,
+          path, " records a watch of another scene: it contains placement ", watch.placements - 1,
           ", counted from 0, but ", things[0], " has only ", scene->objects.size()));
     }
-    scene->watch = std::move(watch->messages);
+    scene->watch = std::move(watch.messages);
     scene->note = absl::StrCat("A recorded watch: the timeline shows the ",
-                               watch->is_of_pairs ? "pairs that collided" : "hulls that existed",
+                               watch.is_of_pairs ? "pairs that collided" : "hulls that existed",
                                ". Shapes and answers are current.");
     return absl::OkStatus();
   }
@@ -206,8 +205,7 @@ class Viewing {
     RobotSceneArguments robot = arguments_.robot;
     robot.robot.urdf = arguments_.things[0];
     robot.scene = arguments_.scene;
-    const absl::Status put = robot.scene.empty() ? absl::OkStatus() : PutSceneIfLocal(robot.scene);
-    if (!put.ok()) return put;
+    HULLD_RETURN_IF_ERROR(robot.scene.empty() ? absl::OkStatus() : PutSceneIfLocal(robot.scene));
     return AddRobot(robot, program_.client, &temporary_, scene);
   }
 
@@ -227,20 +225,19 @@ class Viewing {
   // Reads the shape from the file. With --local, the hull is registered on the local server; any
   // other server receives its vertices with each query.
   absl::Status AddFile(const std::string& path, ViewScene* scene) {
-    auto shape = ReadShape(path);
-    if (!shape.ok()) return shape.status();
-    ViewObject object{shape->name, "", static_cast<int>(scene->files.size()), kIdentityPose};
-    const absl::Status hull = run_.local ? RegisterHull(path, &object) : BuildHull(path, &*shape);
+    HULLD_ASSIGN_OR_RETURN(auto shape, ReadShape(path));
+    ViewObject object{shape.name, "", static_cast<int>(scene->files.size()), kIdentityPose};
+    const absl::Status hull = run_.local ? RegisterHull(path, &object) : BuildHull(path, &shape);
     if (!hull.ok()) {
       run_.err << "hullctl: warning: " << path << " is shown without its hull\n";
       static_cast<void>(run_.FailUsage(hull));
     }
-    if (shape->hull != nullptr) {
-      object.hull_id = shape->hull_name;
-      object.hull = shape->hull;
+    if (shape.hull != nullptr) {
+      object.hull_id = shape.hull_name;
+      object.hull = shape.hull;
     }
     scene->objects.push_back(std::move(object));
-    scene->files.push_back(std::make_shared<FileShape>(*std::move(shape)));
+    scene->files.push_back(std::make_shared<FileShape>(std::move(shape)));
     return absl::OkStatus();
   }
 
@@ -251,14 +248,13 @@ class Viewing {
   }
 
   static absl::Status BuildHull(const std::string& path, FileShape* shape) {
-    auto hull = HullOfFile(path);
-    if (!hull.ok()) return hull.status();
-    if (hull->vertex_count() > kMaxShapePoints) {
-      return absl::InvalidArgumentError(absl::StrCat("its hull has ", hull->vertex_count(),
+    HULLD_ASSIGN_OR_RETURN(auto hull, HullOfFile(path));
+    if (hull.vertex_count() > kMaxShapePoints) {
+      return absl::InvalidArgumentError(absl::StrCat("its hull has ", hull.vertex_count(),
                                                      " vertices, but a query can carry at most ",
                                                      kMaxShapePoints, "; use --local"));
     }
-    shape->hull = std::make_shared<const HullMesh>(*std::move(hull));
+    shape->hull = std::make_shared<const HullMesh>(std::move(hull));
     // In the form accepted by `hullctl check`.
     const bool is_path = path.starts_with('.') || path.starts_with('/');
     shape->hull_name = Printable(absl::StrCat(is_path ? "" : "./", path));
@@ -328,35 +324,32 @@ class Viewing {
 
 ExitCode View(const Invocation& run, const ViewArguments& arguments) {
   if (arguments.demo && !arguments.things.empty()) {
-    return run.FailUsage(
-        absl::InvalidArgumentError("--demo shows its own scenes; remove " + arguments.things[0]));
+    return run.FailUsage("--demo shows its own scenes; remove " + arguments.things[0]);
   }
   const bool is_robot = arguments.things.size() == 1 && IsRobot(arguments.things[0]);
   if (!is_robot && !(arguments.robot.joints.empty() && arguments.robot.srdf.empty() &&
                      arguments.robot.ignored.empty() && arguments.robot.robot.packages.empty())) {
-    return run.FailUsage(absl::InvalidArgumentError(
-        "--joints, --srdf, --ignore, and --package apply to a robot; pass one .urdf file"));
+    return run.FailUsage(
+        "--joints, --srdf, --ignore, and --package apply to a robot; pass one .urdf file");
   }
   const std::string& scene = arguments.scene;
   if (!scene.empty() && !arguments.demo && !is_robot) {
-    return run.FailUsage(absl::InvalidArgumentError(
-        "--scene needs --demo, or a robot to place in the scene; pass one .urdf file"));
+    return run.FailUsage(
+        "--scene needs --demo, or a robot to place in the scene; pass one .urdf file");
   }
   if (!scene.empty() && arguments.demo && (scene.size() != 1 || scene[0] < '0' || scene[0] > '7')) {
-    return run.FailUsage(absl::InvalidArgumentError(
-        absl::StrCat("--scene: ", Quoted(scene), " is not a demo scene; pass a key from 0 to 7")));
+    return run.FailUsage(
+        absl::StrCat("--scene: ", Quoted(scene), " is not a demo scene; pass a key from 0 to 7"));
   }
   if (!arguments.recording.empty() && (arguments.demo || is_robot)) {
-    return run.FailUsage(
-        absl::InvalidArgumentError("--recording cannot be combined with --demo or a robot"));
+    return run.FailUsage("--recording cannot be combined with --demo or a robot");
   }
   const int files = !arguments.html_file.empty() + !arguments.png_file.empty();
   if (files == 2) {
-    return run.FailUsage(absl::InvalidArgumentError("--html and --png cannot be combined"));
+    return run.FailUsage("--html and --png cannot be combined");
   }
   if (files == 1 && arguments.edit) {
-    return run.FailUsage(
-        absl::InvalidArgumentError("--edit cannot be combined with --html or --png"));
+    return run.FailUsage("--edit cannot be combined with --html or --png");
   }
   const bool is_temporary =
       arguments.demo || (!arguments.things.empty() && scene.empty() &&

@@ -8,7 +8,6 @@
 #include <string>
 #include <utility>
 
-#include "client/formats/byte_source.h"
 #include "client/formats/text_number.h"
 #include "client/hullctl/command_line/interrupt.h"
 #include "client/hullctl/commands/commands.h"
@@ -142,13 +141,8 @@ std::string DecidingPieces(const Scene& scene, const v1::CollisionEvent& event) 
 }
 
 ExitCode WatchScene(const Invocation& run, const WatchOptions& options) {
-  const auto source = ByteSource::Open(options.scene);
-  if (!source.ok()) return run.FailUsage(source.status());
-  const auto scene = ReadScene(source->get());
+  const auto scene = ReadWholeScene(options.scene, "watch");
   if (!scene.ok()) return run.FailUsage(scene.status());
-  if (absl::Status rest = RefuseUpdates(source->get(), "watch"); !rest.ok()) {
-    return run.FailUsage(rest);
-  }
   const auto name = [&](uint32_t placement) {
     return scene->HullOf(placement) == nullptr ? absl::StrCat(placement) : scene->NameOf(placement);
   };
@@ -224,8 +218,7 @@ void AddWatchCommand(Command program, Invocation* invocation) {
       const Invocation& run = *invocation;
       if (options->scene.empty()) return WatchHulls(run, *options);
       if (options->prefix.empty() && !options->exact) return WatchScene(run, *options);
-      return run.FailUsage(
-          absl::InvalidArgumentError("--scene cannot be combined with PREFIX or --exact"));
+      return run.FailUsage("--scene cannot be combined with PREFIX or --exact");
     };
   });
 }

@@ -14,7 +14,6 @@
 #include <vector>
 
 #include "client/formats/text_number.h"
-#include "client/hullctl/command_line/arguments.h"
 #include "client/hullctl/command_line/freshness_options.h"
 #include "client/hullctl/local/file_shape.h"
 #include "client/hullctl/pairs/batch_answers.h"
@@ -24,6 +23,8 @@
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/printing/progress_bar.h"
 #include "client/hullctl/printing/table.h"
+#include "client/packed_placements.h"
+#include "client/status_macros.h"
 #include "client/verify/answer_check.h"
 
 namespace hulld {
@@ -49,8 +50,7 @@ class JudgedHulls {
         if (!is_new) continue;
         entry->second.set_hull_id(name);
         if (!IsShapeFile(name)) continue;
-        const absl::Status set = SetShape(run, name, &entry->second);
-        if (!set.ok()) return set;
+        HULLD_RETURN_IF_ERROR(SetShape(run, name, &entry->second));
       }
     }
     Pack();
@@ -138,14 +138,13 @@ class JudgeRun {
     for (size_t begin = 0; begin < answers.size(); begin += kAnswersPerCall) {
       const Answers part =
           answers.subspan(begin, std::min(kAnswersPerCall, answers.size() - begin));
-      const absl::Status asked =
+      HULLD_RETURN_IF_ERROR(
           AskBatch(client_, RequestFor(part), nullptr,
                    [&](size_t pair, const AnswerRow& row, const std::string* problem) {
                      Take(*part[pair], row, problem);
                      bar_.Update(++taken_);
                      return absl::OkStatus();
-                   });
-      if (!asked.ok()) return asked;
+                   }));
     }
     return absl::OkStatus();
   }
@@ -201,28 +200,19 @@ class JudgeRun {
     for (const size_t side : {size_t{0}, size_t{1}}) {
       v1::Placement& placement = side == 0 ? *request.mutable_a() : *request.mutable_b();
       placement = hulls_.placement(wrong.answer->names[side]);
-      const auto set = [](const std::array<double, 7>& numbers, v1::Pose* pose) {
-        const auto made = PoseFromNumbers({numbers.begin(), numbers.end()});
-        if (made.ok()) *pose = *made;
-        return made.status();
-      };
-      absl::Status made = set(wrong.answer->poses[side], placement.mutable_pose());
-      if (made.ok() && moves) {
-        made = set(wrong.answer->end_poses[side], placement.mutable_end_pose());
-      }
-      if (!made.ok()) return made;
+      *placement.mutable_pose() = PoseOf(wrong.answer->poses[side]);
+      if (moves) *placement.mutable_end_pose() = PoseOf(wrong.answer->end_poses[side]);
     }
-    const auto verified = CheckCollisionVerified(client_, request);
-    if (!verified.ok()) return verified.status();
-    if (verified->verification.verdict == Verdict::kInvalid) ++invalid_;
+    HULLD_ASSIGN_OR_RETURN(const auto verified, CheckCollisionVerified(client_, request));
+    if (verified.verification.verdict == Verdict::kInvalid) ++invalid_;
     AnswerRow row;
-    row.relation = verified->response.relation();
+    row.relation = verified.response.relation();
     if (moves) {
-      row.first_contact = verified->response.first_contact();
+      row.first_contact = verified.response.first_contact();
     } else {
-      row.separation = verified->response.separation();
+      row.separation = verified.response.separation();
     }
-    Print({wrong.answer, Judge(*wrong.answer, row, arguments_.allowed)}, row, request, *verified);
+    Print({wrong.answer, Judge(*wrong.answer, row, arguments_.allowed)}, row, request, verified);
     return absl::OkStatus();
   }
 
@@ -297,9 +287,8 @@ class JudgeRun {
     }
     const Answers part = resting.subspan(0, std::min(kAnswersPerCall, resting.size()));
     for (const double exponent : {-15.0, -12.0, -9.0, -6.0, -3.0}) {
-      const auto point = Measure(part, std::pow(10, exponent));
-      if (!point.ok()) return point.status();
-      plot.server.push_back(*point);
+      HULLD_ASSIGN_OR_RETURN(const auto point, Measure(part, std::pow(10, exponent)));
+      plot.server.push_back(point);
     }
     return WriteTradePlot(plot, arguments_.plot_file);
   }

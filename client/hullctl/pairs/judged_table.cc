@@ -13,10 +13,10 @@
 
 #include "client/formats/byte_source.h"
 #include "client/formats/text_number.h"
-#include "client/hullctl/body/body_pieces.h"
-#include "client/hullctl/command_line/arguments.h"
+#include "client/packed_placements.h"
 #include "client/pose/rigid_pose.h"
 #include "client/robot/joint_file.h"
+#include "client/status_macros.h"
 
 namespace hulld {
 namespace {
@@ -34,11 +34,10 @@ absl::StatusOr<double> NumberOf(std::string_view cell) {
 }
 
 absl::Status ReadFinite(std::string_view cell, double* number) {
-  const auto read = NumberOf(cell);
-  if (!read.ok()) return read.status();
-  if (std::isinf(*read))
+  HULLD_ASSIGN_OR_RETURN(const auto read, NumberOf(cell));
+  if (std::isinf(read))
     return absl::InvalidArgumentError(absl::StrCat(std::string(cell), " is not finite"));
-  *number = *read;
+  *number = read;
   return absl::OkStatus();
 }
 
@@ -79,13 +78,12 @@ absl::Status ReadDistance(std::string_view cell, std::optional<double>* distance
 // Reads a number from 0 to `most`, called `what`.
 absl::Status ReadUpTo(double most, const char* what, std::string_view cell,
                       std::optional<double>* value) {
-  const auto read = NumberOf(cell);
-  if (!read.ok()) return read.status();
-  if (*read < 0 || *read > most) {
+  HULLD_ASSIGN_OR_RETURN(const auto read, NumberOf(cell));
+  if (read < 0 || read > most) {
     return absl::InvalidArgumentError(
         absl::StrCat(std::string(cell), " is not a ", what, "; leave the cell empty"));
   }
-  *value = *read;
+  *value = read;
   return absl::OkStatus();
 }
 
@@ -230,14 +228,8 @@ class TableReader {
       answer->moves = answer->moves || cells[i].has_value();
       end[i] = cells[i].value_or(end[i]);
     }
-    if (absl::Status rotates = CheckRotation(end, name); !rotates.ok()) return rotates;
-    const auto to = PoseFromNumbers({end.begin(), end.end()});
-    const auto from = PoseFromNumbers({answer->poses[side].begin(), answer->poses[side].end()});
-    if (!to.ok() || !from.ok()) return to.ok() ? from.status() : to.status();
-    v1::Placement placement;
-    *placement.mutable_pose() = *from;
-    SetMotion(*to, &placement);
-    answer->end_poses[side] = NumbersOf(placement.end_pose());
+    HULLD_RETURN_IF_ERROR(CheckRotation(end, name));
+    answer->end_poses[side] = OnShorterPath(answer->poses[side], end);
     return absl::OkStatus();
   }
 
@@ -300,26 +292,25 @@ Judgement JudgeMotion(const JudgedAnswer& answer, const AnswerRow& row, double m
 
 absl::StatusOr<std::vector<JudgedAnswer>> ReadJudgedTable(const std::string& path,
                                                           std::vector<std::string>* ignored) {
-  const auto source = ByteSource::Open(path);
-  if (!source.ok()) return source.status();
+  HULLD_ASSIGN_OR_RETURN(const auto source, ByteSource::Open(path));
   TableReader reader;
   std::vector<JudgedAnswer> answers;
   bool has_header = false;
   std::string_view line;
-  while ((*source)->ReadLine(&line)) {
+  while (source->ReadLine(&line)) {
     const std::vector<std::string_view> cells = CellsOf(line);
     if (cells.empty()) continue;
     if (!std::exchange(has_header, true)) {
       const absl::Status read = reader.ReadHeader(cells, ignored);
-      if (!read.ok()) return (*source)->ErrorAtLine(std::string(read.message()));
+      if (!read.ok()) return source->ErrorAtLine(std::string(read.message()));
       continue;
     }
     auto answer = reader.ReadRow(cells);
-    if (!answer.ok()) return (*source)->ErrorAtLine(std::string(answer.status().message()));
-    answer->line = (*source)->line();
+    if (!answer.ok()) return source->ErrorAtLine(std::string(answer.status().message()));
+    answer->line = source->line();
     answers.push_back(*std::move(answer));
   }
-  if (absl::Status status = (*source)->status(); !status.ok()) return status;
+  HULLD_RETURN_IF_ERROR(source->status());
   if (!answers.empty()) return answers;
   return absl::InvalidArgumentError(absl::StrCat(path, ": the table contains no answers"));
 }

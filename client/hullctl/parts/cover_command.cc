@@ -9,10 +9,11 @@
 
 #include "client/enclosure/coverage.h"
 #include "client/formats/text_number.h"
-#include "client/hullctl/body/body_pieces.h"
 #include "client/hullctl/printing/answer_text.h"
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/printing/progress_bar.h"
+#include "client/packed_placements.h"
+#include "client/status_macros.h"
 
 namespace hulld {
 namespace {
@@ -62,13 +63,12 @@ class PieceFetcher {
 
  private:
   absl::Status AddAll(const std::string& prefix) {
-    const auto list = client_.ListAllHulls(prefix);
-    if (!list.ok()) return list.status();
-    if (list->hulls().empty()) {
+    HULLD_ASSIGN_OR_RETURN(const auto list, client_.ListAllHulls(prefix));
+    if (list.hulls().empty()) {
       return absl::NotFoundError(absl::StrCat("no hull ID starts with ", Quoted(prefix)));
     }
-    for (const v1::HullInfo& hull : list->hulls()) {
-      if (absl::Status added = AddHull(hull.hull_id(), kNoMotion); !added.ok()) return added;
+    for (const v1::HullInfo& hull : list.hulls()) {
+      HULLD_RETURN_IF_ERROR(AddHull(hull.hull_id(), kNoMotion));
     }
     return absl::OkStatus();
   }
@@ -76,9 +76,8 @@ class PieceFetcher {
   absl::Status AddHull(const std::string& id, const RigidPose& X_WH) {
     std::shared_ptr<const HullMesh>& mesh = meshes_[id];
     if (mesh == nullptr) {
-      auto fetched = client_.GetHullMesh(id);
-      if (!fetched.ok()) return fetched.status();
-      mesh = std::make_shared<const HullMesh>(*std::move(fetched));
+      HULLD_ASSIGN_OR_RETURN(auto fetched, client_.GetHullMesh(id));
+      mesh = std::make_shared<const HullMesh>(std::move(fetched));
     }
     pieces_.push_back({mesh, X_WH});
     return absl::OkStatus();
@@ -138,8 +137,8 @@ void PrintCoverage(const Invocation& run, const CoverArguments& arguments, const
 
 ExitCode AnswerCover(const Invocation& run, const CoverArguments& arguments) {
   if (arguments.words.size() < 2) {
-    return run.FailUsage(absl::InvalidArgumentError(
-        "pass IDs of hulls or bodies, then the mesh file: hullctl cover ID... FILE"));
+    return run.FailUsage(
+        "pass IDs of hulls or bodies, then the mesh file: hullctl cover ID... FILE");
   }
   std::vector<std::string> hulls = arguments.words;
   const std::string file = hulls.back();
@@ -147,7 +146,7 @@ ExitCode AnswerCover(const Invocation& run, const CoverArguments& arguments) {
   const auto mesh = ReadMesh(file);
   if (!mesh.ok()) return run.FailUsage(mesh.status());
   if (mesh->triangles.empty()) {
-    return run.FailUsage(absl::InvalidArgumentError(file + ": contains no triangles"));
+    return run.FailUsage(file + ": contains no triangles");
   }
   const Client client = run.MakeClient();
   PieceFetcher fetcher(client);

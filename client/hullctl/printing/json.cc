@@ -1,5 +1,7 @@
 #include "client/hullctl/printing/json.h"
 
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
 #include <google/protobuf/struct.pb.h>
 #include <google/protobuf/util/json_util.h>
 
@@ -50,6 +52,10 @@ std::string QuoteJson(std::string_view text) {
     }
   }
   return quoted + "\"";
+}
+
+std::string JsonArray(const std::vector<std::string>& values) {
+  return absl::StrCat("[", absl::StrJoin(values, ","), "]");
 }
 
 JsonObject& JsonObject::Add(const char* name, std::string_view text) {

@@ -27,6 +27,9 @@ absl::Status ParseMember(const std::string& json, const std::string& name,
 // Returns `text` in quotes, escaped.
 std::string QuoteJson(std::string_view text);
 
+// Returns an array of values that are already JSON.
+std::string JsonArray(const std::vector<std::string>& values);
+
 // Writes one object member by member, in the same mapping.
 class JsonObject {
  public:

@@ -3,9 +3,13 @@
 #include <algorithm>
 #include <utility>
 
-#include "client/hullctl/printing/painter.h"
-
 namespace hulld {
+
+Table& Table::Head(const Painter& paint, const std::vector<std::string>& titles) {
+  std::vector<std::string>& row = rows_.emplace_back();
+  for (const std::string& title : titles) row.push_back(paint(Hue::kHeading, title));
+  return *this;
+}
 
 Table& Table::Row(std::vector<std::string> cells) {
   rows_.push_back(std::move(cells));

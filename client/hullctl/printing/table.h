@@ -6,12 +6,15 @@
 #include <vector>
 
 #include "client/formats/text_number.h"
+#include "client/hullctl/printing/painter.h"
 
 namespace hulld {
 
 // Rows of text in columns as wide as their widest cell.
 class Table {
  public:
+  // Adds a row of titles.
+  Table& Head(const Painter& paint, const std::vector<std::string>& titles);
   Table& Row(std::vector<std::string> cells);
   void Print(std::ostream& out) const;
 

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "client/formats/text_number.h"
-#include "client/hullctl/body/body_pieces.h"
 #include "client/hullctl/command_line/arguments.h"
 #include "client/hullctl/command_line/interrupt.h"
 #include "client/hullctl/command_line/query_options.h"
@@ -23,7 +22,9 @@
 #include "client/hullctl/robot/waypoint_stream.h"
 #include "client/hullctl/scene/scene_file.h"
 #include "client/hullctl/view/view_scene.h"
+#include "client/packed_placements.h"
 #include "client/robot/joint_file.h"
+#include "client/status_macros.h"
 
 namespace hulld {
 namespace {
@@ -146,11 +147,8 @@ class RobotCheck {
 absl::Status RobotCheck::AddScene() {
   for (const RobotPart& part : model_.parts) names_.push_back(part.name);
   if (arguments_.scene.empty()) return absl::OkStatus();
-  const auto source = ByteSource::Open(arguments_.scene);
-  if (!source.ok()) return source.status();
-  auto scene = ReadScene(source->get());
-  if (!scene.ok()) return scene.status();
-  scene_ = *std::move(scene);
+  HULLD_ASSIGN_OR_RETURN(const auto source, ByteSource::Open(arguments_.scene));
+  HULLD_ASSIGN_OR_RETURN(scene_, ReadScene(source.get()));
   for (uint32_t i = 0; i < scene_.size(); ++i) {
     names_.push_back(scene_.NameOf(i));
     around_.hulls.push_back(*scene_.HullOf(i));
@@ -165,9 +163,7 @@ absl::Status RobotCheck::AddScene() {
 absl::Status RobotCheck::ChoosePairs() {
   std::set<LinkPair> out;
   if (!arguments_.srdf.empty()) {
-    auto disabled = ReadDisabledPairs(arguments_.srdf, model_.robot);
-    if (!disabled.ok()) return disabled.status();
-    out = *std::move(disabled);
+    HULLD_ASSIGN_OR_RETURN(out, ReadDisabledPairs(arguments_.srdf, model_.robot));
     left_out_by_ = arguments_.srdf;
   } else if (!arguments_.adjacent) {
     out = AdjacentPairs(model_.robot);
@@ -183,8 +179,7 @@ absl::Status RobotCheck::ChoosePairs() {
   for (uint32_t a = 0; a < robot_parts; ++a) {
     for (uint32_t b = robot_parts; b < names_.size(); ++b) pairs_.insert(pairs_.end(), {a, b});
   }
-  const absl::Status removed = RemoveIgnored(arguments_.ignored, model_, names_, &pairs_);
-  if (!removed.ok()) return removed;
+  HULLD_RETURN_IF_ERROR(RemoveIgnored(arguments_.ignored, model_, names_, &pairs_));
   if (!pairs_.empty()) return absl::OkStatus();
   const std::string hint = !arguments_.ignored.empty() ? "--ignore excludes all of them"
                            : left_out_ == 0 ? "a pair needs two links with shapes, or --scene"
@@ -211,9 +206,8 @@ absl::StatusOr<std::vector<Waypoint>> RobotCheck::ReadWaypoints(size_t most) {
   std::vector<Waypoint> waypoints;
   while (waypoints.size() < most) {
     Waypoint values;
-    const auto more = waypoints_.Next(&values);
-    if (!more.ok()) return more.status();
-    if (!*more) break;
+    HULLD_ASSIGN_OR_RETURN(const auto more, waypoints_.Next(&values));
+    if (!more) break;
     WarnOfLimits(checked_ + waypoints.size(), values);
     waypoints.push_back(std::move(values));
   }
@@ -230,16 +224,14 @@ absl::Status RobotCheck::CheckWaypoints(CheckScope scope) {
                         [this](uint64_t waypoint, size_t pair, const AnswerRow& row,
                                const std::string& problem) { Take(waypoint, pair, row, problem); });
   while (!IsFinished()) {
-    const auto waypoints = ReadWaypoints(stream.lanes());
-    if (!waypoints.ok()) return waypoints.status();
-    if (waypoints->empty()) break;
+    HULLD_ASSIGN_OR_RETURN(const auto waypoints, ReadWaypoints(stream.lanes()));
+    if (waypoints.empty()) break;
     std::vector<double> poses;
-    for (const Waypoint& values : *waypoints) {
+    for (const Waypoint& values : waypoints) {
       model_.AppendPoses(arguments_.X_WB, AllJointValues(model_.robot, values), &poses);
     }
-    absl::Status asked = stream.Ask(waypoints->size(), poses);
-    if (!asked.ok()) return asked;
-    checked_ += waypoints->size();
+    HULLD_RETURN_IF_ERROR(stream.Ask(waypoints.size(), poses));
+    checked_ += waypoints.size();
     bar_.Update(checked_ * pairs_.size() / 2);
   }
   return stream.Close();
@@ -270,13 +262,12 @@ absl::Status RobotCheck::CheckMotions(CheckScope scope) {
                         [this](const ContinuousCheck::Event& event) { TakeEvent(event); });
   while (!IsFinished()) {
     // The last waypoint of one call starts the motion of the next one.
-    const auto waypoints = ReadWaypoints(check.waypoints_per_call());
-    if (!waypoints.ok()) return waypoints.status();
-    if (waypoints->empty()) break;
-    absl::Status checked = check.Check(*waypoints);
+    HULLD_ASSIGN_OR_RETURN(const auto waypoints, ReadWaypoints(check.waypoints_per_call()));
+    if (waypoints.empty()) break;
+    absl::Status checked = check.Check(waypoints);
     if (absl::IsCancelled(checked)) break;
     if (!checked.ok()) return checked;
-    checked_ += waypoints->size();
+    checked_ += waypoints.size();
     bar_.Update(checked_ * pairs_.size() / 2);
   }
   return absl::OkStatus();

@@ -20,6 +20,7 @@
 #include "client/point_messages.h"
 #include "client/robot/package_path.h"
 #include "client/robot/urdf_file.h"
+#include "client/status_macros.h"
 
 namespace hulld {
 
@@ -68,9 +69,8 @@ MeshSplit SplitOf(const RobotArguments& arguments) {
 absl::StatusOr<std::vector<MeshPiece>> ShapePieces(const CollisionShape& shape,
                                                    const PackagePaths& paths, MeshSplit split) {
   if (shape.kind != ShapeKind::kMesh) return std::vector<MeshPiece>{{PrimitiveHull(shape), {}}};
-  const auto file = ResolveFile(paths, shape.mesh);
-  if (!file.ok()) return file.status();
-  return MeshPieces(shape, *file, split);
+  HULLD_ASSIGN_OR_RETURN(const auto file, ResolveFile(paths, shape.mesh));
+  return MeshPieces(shape, file, split);
 }
 
 // Adds the parts of a link to the model.
@@ -143,15 +143,13 @@ class HullBuilder {
  public:
   absl::StatusOr<HullMesh> Build(const RobotPart& part) {
     if (!client_.has_value()) {
-      auto server = LocalServer::Start();
-      if (!server.ok()) return server.status();
-      server_ = *std::move(server);
+      HULLD_ASSIGN_OR_RETURN(server_, LocalServer::Start());
       ClientOptions options;
       options.server = server_->address();
       options.own_connection = true;
       client_.emplace(std::move(options));
     }
-    if (absl::Status built = RegisterPart(*client_, part, "part"); !built.ok()) return built;
+    HULLD_RETURN_IF_ERROR(RegisterPart(*client_, part, "part"));
     return client_->GetHullMesh("part");
   }
 
@@ -226,15 +224,12 @@ std::vector<uint32_t> RobotModel::PairsWithout(const std::set<LinkPair>& left_ou
 }
 
 absl::StatusOr<RobotModel> ReadRobot(const RobotArguments& arguments) {
-  auto robot = ReadUrdf(arguments.urdf);
-  if (!robot.ok()) return robot.status();
-  const auto paths = PathsOf(arguments);
-  if (!paths.ok()) return paths.status();
+  HULLD_ASSIGN_OR_RETURN(auto robot, ReadUrdf(arguments.urdf));
+  HULLD_ASSIGN_OR_RETURN(const auto paths, PathsOf(arguments));
   RobotModel model;
-  model.robot = *std::move(robot);
+  model.robot = std::move(robot);
   for (size_t link = 0; link < model.robot.links.size(); ++link) {
-    absl::Status added = AddLink(arguments, *paths, link, &model);
-    if (!added.ok()) return added;
+    HULLD_RETURN_IF_ERROR(AddLink(arguments, paths, link, &model));
   }
   if (model.parts.empty()) {
     return absl::InvalidArgumentError(absl::StrCat(
@@ -251,14 +246,12 @@ absl::Status PrepareHulls(const Invocation& run, const RobotArguments& arguments
   for (RobotPart& part : model->parts) {
     if (registers) {
       part.hull_id = arguments.prefix + UniqueHullSegment(part.name, &taken);
-      absl::Status registered = RegisterPart(client, part, part.hull_id);
-      if (!registered.ok()) return registered;
+      HULLD_RETURN_IF_ERROR(RegisterPart(client, part, part.hull_id));
       // Failure to read the hull does not fail the check; the mesh is only compared.
       const auto hull = part.mesh.triangles.empty() ? HullMesh() : client.GetHullMesh(part.hull_id);
       if (hull.ok()) WarnOfSwollenPart(run, part, *hull);
     } else {
-      absl::Status reduced = ReduceToVertices(run, &builder, &part);
-      if (!reduced.ok()) return reduced;
+      HULLD_RETURN_IF_ERROR(ReduceToVertices(run, &builder, &part));
     }
     part.mesh = {};
   }

@@ -18,6 +18,7 @@
 #include "client/robot/joint_file.h"
 #include "client/robot/robot.h"
 #include "client/robot/srdf_file.h"
+#include "client/status_macros.h"
 
 namespace hulld {
 namespace {
@@ -40,18 +41,15 @@ std::array<double, 2> RangeOf(const RobotJoint& joint, const JointVariable& vari
 absl::StatusOr<std::vector<std::vector<double>>> ReadWaypoints(const std::string& path,
                                                                const Robot& robot) {
   std::vector<std::vector<double>> waypoints;
-  const auto source = ByteSource::Open(path);
-  if (!source.ok()) return source.status();
-  auto reader = WaypointReader::Open(source->get(), robot);
-  if (!reader.ok()) return reader.status();
+  HULLD_ASSIGN_OR_RETURN(const auto source, ByteSource::Open(path));
+  HULLD_ASSIGN_OR_RETURN(auto reader, WaypointReader::Open(source.get(), robot));
   std::vector<double> values;
   while (true) {
-    const auto more = reader->Next(&values);
-    if (!more.ok()) return more.status();
-    if (!*more) break;
+    HULLD_ASSIGN_OR_RETURN(const auto more, reader.Next(&values));
+    if (!more) break;
     if (waypoints.size() == kMaxShownWaypoints) {
       return absl::InvalidArgumentError(
-          absl::StrCat(path, ":", reader->line(), ": the viewer shows up to ", kMaxShownWaypoints,
+          absl::StrCat(path, ":", reader.line(), ": the viewer shows up to ", kMaxShownWaypoints,
                        " waypoints; remove the rest"));
     }
     waypoints.push_back(values);
@@ -101,13 +99,7 @@ void AddParts(RobotModel* model, ViewScene* scene) {
     object.file = static_cast<int>(scene->files.size());
     auto shape = std::make_shared<FileShape>();
     shape->name = part.name;
-    shape->point_count = part.mesh.vertices.size();
-    for (const auto& vertex : part.mesh.vertices) {
-      shape->xyz.insert(shape->xyz.end(), vertex.begin(), vertex.end());
-    }
-    for (const auto& triangle : part.mesh.triangles) {
-      shape->triangles.insert(shape->triangles.end(), triangle.begin(), triangle.end());
-    }
+    SetMesh(part.mesh, shape.get());
     scene->files.push_back(std::move(shape));
   }
 }
@@ -129,8 +121,7 @@ void PlaceParts(const RobotModel& model, ViewScene* scene) {
 // Appends the placements of a scene file, which are at rest.
 absl::Status AddSurroundings(const std::string& path, ViewScene* scene) {
   ViewScene around;
-  const absl::Status read = AddSceneFile(path, &around);
-  if (!read.ok()) return read;
+  HULLD_RETURN_IF_ERROR(AddSceneFile(path, &around));
   const int files = static_cast<int>(scene->files.size());
   for (ViewObject& object : around.objects) {
     if (object.motion) {
@@ -165,11 +156,11 @@ absl::Status NamePairs(const RobotModel& model, const std::set<LinkPair>& left_o
 absl::Status RegisterParts(TemporaryHulls* temporary, RobotModel* model) {
   std::set<std::string> taken;
   for (RobotPart& part : model->parts) {
-    auto id = temporary->Add(
-        UniqueHullSegment(part.name, &taken),
-        [&part](const Client::PointSink& sink) { return SendInMessages(part.hull.xyz, sink); });
-    if (!id.ok()) return id.status();
-    part.hull_id = *std::move(id);
+    HULLD_ASSIGN_OR_RETURN(auto id, temporary->Add(UniqueHullSegment(part.name, &taken),
+                                                   [&part](const Client::PointSink& sink) {
+                                                     return SendInMessages(part.hull.xyz, sink);
+                                                   }));
+    part.hull_id = std::move(id);
     part.mesh = {};
   }
   return absl::OkStatus();
@@ -179,12 +170,11 @@ absl::Status RegisterParts(TemporaryHulls* temporary, RobotModel* model) {
 absl::Status FindContacts(const Client& client, ViewScene* scene) {
   std::vector<ViewObject> objects = scene->objects;
   for (uint32_t i = 0; i < scene->joints.waypoints.size(); ++i) {
-    const auto poses = scene->joints.poses(scene->joints.waypoints[i]);
-    if (!poses.ok()) return poses.status();
-    for (size_t part = 0; part < poses->size(); ++part) objects[part].pose = (*poses)[part];
-    const auto collides = AnyCollides(client, scene->rules, scene->pairs, objects);
-    if (!collides.ok()) return collides.status();
-    if (*collides) scene->joints.contacts.push_back(i);
+    HULLD_ASSIGN_OR_RETURN(const auto poses, scene->joints.poses(scene->joints.waypoints[i]));
+    for (size_t part = 0; part < poses.size(); ++part) objects[part].pose = poses[part];
+    HULLD_ASSIGN_OR_RETURN(const auto collides,
+                           AnyCollides(client, scene->rules, scene->pairs, objects));
+    if (collides) scene->joints.contacts.push_back(i);
   }
   return absl::OkStatus();
 }
@@ -193,26 +183,21 @@ absl::Status FindContacts(const Client& client, ViewScene* scene) {
 
 absl::Status AddRobot(const RobotSceneArguments& arguments, const Client& client,
                       TemporaryHulls* temporary, ViewScene* scene) {
-  auto model = ReadRobot(arguments.robot);
-  if (!model.ok()) return model.status();
-  const absl::StatusOr<std::set<LinkPair>> left_out =
-      arguments.srdf.empty() ? AdjacentPairs(model->robot)
-                             : ReadDisabledPairs(arguments.srdf, model->robot);
-  if (!left_out.ok()) return left_out.status();
+  HULLD_ASSIGN_OR_RETURN(auto model, ReadRobot(arguments.robot));
+  HULLD_ASSIGN_OR_RETURN(const std::set<LinkPair> left_out,
+                         arguments.srdf.empty() ? AdjacentPairs(model.robot)
+                                                : ReadDisabledPairs(arguments.srdf, model.robot));
   if (!arguments.joints.empty()) {
-    auto waypoints = ReadWaypoints(arguments.joints, model->robot);
-    if (!waypoints.ok()) return waypoints.status();
-    scene->joints.waypoints = *std::move(waypoints);
+    HULLD_ASSIGN_OR_RETURN(scene->joints.waypoints, ReadWaypoints(arguments.joints, model.robot));
   }
-  AddParts(&*model, scene);
-  absl::Status registered = RegisterParts(temporary, &*model);
-  if (!registered.ok()) return registered;
-  const auto shared = std::make_shared<const RobotModel>(*std::move(model));
+  AddParts(&model, scene);
+  HULLD_RETURN_IF_ERROR(RegisterParts(temporary, &model));
+  const auto shared = std::make_shared<const RobotModel>(std::move(model));
   AddJoints(shared, &scene->joints);
   PlaceParts(*shared, scene);
   absl::Status added =
       arguments.scene.empty() ? absl::OkStatus() : AddSurroundings(arguments.scene, scene);
-  if (added.ok()) added = NamePairs(*shared, *left_out, arguments.ignored, scene);
+  if (added.ok()) added = NamePairs(*shared, left_out, arguments.ignored, scene);
   return added.ok() ? FindContacts(client, scene) : added;
 }
 

@@ -7,9 +7,10 @@
 #include <utility>
 
 #include "client/formats/text_number.h"
-#include "client/hullctl/body/body_pieces.h"
 #include "client/hullctl/command_line/arguments.h"
 #include "client/hullctl/help/suggestion.h"
+#include "client/packed_placements.h"
+#include "client/status_macros.h"
 
 namespace hulld {
 namespace {
@@ -40,13 +41,11 @@ absl::Status SetJoint(const Robot& robot, const std::string& name, const std::st
   }
   JointValue value = {};
   if (loose->kind == JointKind::kFloating) {
-    const auto pose = ParsePose(text);
-    if (!pose.ok()) return pose.status();
-    value = NumbersOf(*pose);
+    HULLD_ASSIGN_OR_RETURN(const auto pose, ParsePose(text));
+    value = NumbersOf(pose);
   } else {
-    const auto triple = ParseTriple(text);
-    if (!triple.ok()) return triple.status();
-    std::copy(triple->begin(), triple->end(), value.begin());
+    HULLD_ASSIGN_OR_RETURN(const auto triple, ParseTriple(text));
+    std::copy(triple.begin(), triple.end(), value.begin());
   }
   for (size_t i = 0; i < variables.size(); ++i) {
     if (variables[i].joint == joint) (*values)[i] = value[variables[i].place];
@@ -66,8 +65,7 @@ absl::StatusOr<Waypoint> WaypointSource::GivenValues() const {
     const std::string text = equals == std::string::npos ? "" : given.substr(equals + 1);
     const auto set = SetJoint(robot_, name, text, variables, &values);
     if (!set.ok()) {
-      const std::string message(set.message().data(), set.message().size());
-      return absl::InvalidArgumentError(absl::StrCat("--joint: ", message));
+      return absl::InvalidArgumentError(absl::StrCat("--joint: ", set.message()));
     }
   }
   const std::string joint = JointWithoutRotation(robot_, values);
@@ -80,18 +78,13 @@ absl::StatusOr<Waypoint> WaypointSource::GivenValues() const {
 
 absl::Status WaypointSource::Open(const std::string& file) {
   if (!file.empty()) {
-    auto source = ByteSource::Open(file);
-    if (!source.ok()) return source.status();
-    source_ = *std::move(source);
-    auto reader = WaypointReader::Open(source_.get(), robot_);
-    if (!reader.ok()) return reader.status();
-    reader_ = *std::move(reader);
+    HULLD_ASSIGN_OR_RETURN(source_, ByteSource::Open(file));
+    HULLD_ASSIGN_OR_RETURN(reader_, WaypointReader::Open(source_.get(), robot_));
   }
   Waypoint values;
   while (pending_.size() < 2) {
-    const auto more = Read(&values);
-    if (!more.ok()) return more.status();
-    if (!*more) break;
+    HULLD_ASSIGN_OR_RETURN(const auto more, Read(&values));
+    if (!more) break;
     pending_.push_back(values);
   }
   has_many_ = pending_.size() > 1;
@@ -107,9 +100,8 @@ absl::StatusOr<bool> WaypointSource::Read(Waypoint* free_values) {
   }
   if (given_was_read_) return false;
   given_was_read_ = true;
-  auto given = GivenValues();
-  if (!given.ok()) return given.status();
-  *free_values = *std::move(given);
+  HULLD_ASSIGN_OR_RETURN(auto given, GivenValues());
+  *free_values = std::move(given);
   return true;
 }
 

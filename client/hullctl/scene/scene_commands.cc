@@ -195,10 +195,10 @@ ExitCode ApplyScene(const Invocation& run, const SyncArguments& arguments) {
   const auto scene = ReadYamlScene(arguments.file);
   if (!scene.ok()) return run.FailUsage(scene.status());
   if (arguments.prune && !OwnsItsPrefix(*scene)) {
-    return run.FailUsage(absl::InvalidArgumentError(
-        absl::StrCat(arguments.file, ": --prune needs a prefix that ends in \"/\", such as ",
-                     scene->prefix.empty() ? "cell-3" : scene->prefix,
-                     "/; \"cell-3\" would also match cell-30/arm")));
+    return run.FailUsage(absl::StrCat(arguments.file,
+                                      ": --prune needs a prefix that ends in \"/\", such as ",
+                                      scene->prefix.empty() ? "cell-3" : scene->prefix,
+                                      "/; \"cell-3\" would also match cell-30/arm"));
   }
   return SceneSync(run, *scene).Run(!arguments.dry_run, arguments.prune, arguments.yes);
 }

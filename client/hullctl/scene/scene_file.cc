@@ -10,12 +10,14 @@
 #include <cctype>
 #include <numeric>
 #include <set>
+#include <span>
 #include <string_view>
 #include <utility>
 
 #include "client/formats/text_number.h"
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/scene/yaml_scene.h"
+#include "client/packed_placements.h"
 #include "client/pose/rigid_pose.h"
 
 namespace hulld {
@@ -254,18 +256,8 @@ class GroupRule {
 };
 
 // Unpacks the pose of a placement.
-void SetPose(const google::protobuf::RepeatedField<double>& poses, uint32_t placement,
-             v1::Pose* pose) {
-  const double* const numbers = poses.data() + ptrdiff_t{kPoseNumbers} * placement;
-  v1::Quaternion& rotation = *pose->mutable_rotation();
-  rotation.set_w(numbers[0]);
-  rotation.set_x(numbers[1]);
-  rotation.set_y(numbers[2]);
-  rotation.set_z(numbers[3]);
-  v1::Vector3& translation = *pose->mutable_translation();
-  translation.set_x(numbers[4]);
-  translation.set_y(numbers[5]);
-  translation.set_z(numbers[6]);
+v1::Pose PackedPose(const google::protobuf::RepeatedField<double>& poses, uint32_t placement) {
+  return PoseOf(std::span<const double, 7>(poses.data() + ptrdiff_t{kPoseNumbers} * placement, 7));
 }
 
 }  // namespace
@@ -301,9 +293,9 @@ v1::Placement Scene::PlacementOf(uint32_t placement) const {
         packed.shape_points().xyz().data() + 3 * std::accumulate(sizes, sizes + shape, uint64_t{0});
     result.mutable_points()->mutable_xyz()->Add(points, points + 3 * size_t{sizes[shape]});
   }
-  SetPose(packed.poses(), placement, result.mutable_pose());
+  *result.mutable_pose() = PackedPose(packed.poses(), placement);
   if (!packed.end_poses().empty()) {
-    SetPose(packed.end_poses(), placement, result.mutable_end_pose());
+    *result.mutable_end_pose() = PackedPose(packed.end_poses(), placement);
   }
   if (packed.radii_size() > 0) result.set_radius(packed.radii(static_cast<int>(placement)));
   return result;
@@ -417,13 +409,19 @@ absl::StatusOr<std::vector<uint32_t>> PairsOf(const Scene& scene, const std::str
   return pairs;
 }
 
-absl::Status RefuseUpdates(ByteSource* source, const std::string& command) {
-  for (std::string_view line; source->ReadLine(&line);) {
+absl::StatusOr<Scene> ReadWholeScene(const std::string& path, const std::string& command,
+                                     BodyForm form) {
+  const auto source = ByteSource::Open(path);
+  if (!source.ok()) return source.status();
+  auto scene = ReadScene(source->get(), form);
+  if (!scene.ok()) return scene;
+  for (std::string_view line; (*source)->ReadLine(&line);) {
     if (Trim(line).empty()) continue;
-    return source->ErrorAtLine(absl::StrCat(
+    return (*source)->ErrorAtLine(absl::StrCat(
         "'hullctl ", command, "' does not accept updates after the scene; use 'hullctl stream'"));
   }
-  return source->status();
+  if (!(*source)->status().ok()) return (*source)->status();
+  return scene;
 }
 
 }  // namespace hulld

@@ -96,9 +96,10 @@ absl::StatusOr<Scene> ReadScene(ByteSource* source, BodyForm form = BodyForm::kW
 // allow. INVALID_ARGUMENT: more than kMaxPairs, none, or groups that do not match the placements.
 absl::StatusOr<std::vector<uint32_t>> PairsOf(const Scene& scene, const std::string& file);
 
-// INVALID_ARGUMENT, naming the line: updates of a stream follow the scene, which `command` does not
-// use.
-absl::Status RefuseUpdates(ByteSource* source, const std::string& command);
+// Reads a file that contains nothing but a scene; "-" is standard input. INVALID_ARGUMENT as in
+// ReadScene, or naming the line: updates of a stream follow, which `command` does not use.
+absl::StatusOr<Scene> ReadWholeScene(const std::string& path, const std::string& command,
+                                     BodyForm form = BodyForm::kWhole);
 
 }  // namespace hulld
 

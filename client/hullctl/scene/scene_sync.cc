@@ -11,26 +11,19 @@
 
 #include "client/enclosure/convex_region.h"
 #include "client/formats/point_file.h"
-#include "client/hullctl/body/body_pieces.h"
 #include "client/hullctl/scene/yaml_scene.h"
+#include "client/packed_placements.h"
 #include "client/point_messages.h"
+#include "client/status_macros.h"
 
 namespace hulld {
 namespace {
 
 absl::StatusOr<std::vector<double>> ReadFile(const HullDefinition& hull) {
-  const auto format = PointFormatOfPath(hull.file);
-  if (!format.ok()) return format.status();
-  std::vector<double> xyz;
-  ReadRequest request{hull.file, *format, {}, {}};
+  HULLD_ASSIGN_OR_RETURN(const PointFormat format, PointFormatOfPath(hull.file));
+  ReadRequest request{hull.file, format, {}, {}};
   request.options.scale.fill(hull.scale);
-  const auto counts = ReadPoints(request, [&](const PointChunk& block) {
-    xyz.insert(xyz.end(), block.xyz.begin(), block.xyz.end());
-    xyz.insert(xyz.end(), block.xyz_float.begin(), block.xyz_float.end());
-    return absl::OkStatus();
-  });
-  if (!counts.ok()) return counts.status();
-  return xyz;
+  return ReadAllPoints(request);
 }
 
 std::array<uint64_t, 7> BitsOf(const v1::Pose& pose) {
@@ -43,8 +36,7 @@ absl::StatusOr<std::vector<double>> PointsOf(const HullDefinition& hull) {
   if (hull.file.empty()) return hull.xyz;
   auto xyz = ReadFile(hull);
   if (xyz.ok()) return xyz;
-  const std::string message(xyz.status().message().data(), xyz.status().message().size());
-  return absl::InvalidArgumentError(absl::StrCat(hull.where, ": ", message));
+  return absl::InvalidArgumentError(absl::StrCat(hull.where, ": ", xyz.status().message()));
 }
 
 absl::StatusOr<Change> Compare(const Client& client, const std::string& hull_id,
@@ -52,9 +44,8 @@ absl::StatusOr<Change> Compare(const Client& client, const std::string& hull_id,
   const auto mesh = client.GetHullMesh(hull_id);
   if (absl::IsNotFound(mesh.status())) return Change::kCreate;
   if (!mesh.ok()) return mesh.status();
-  const auto same = IsHullOf(*mesh, xyz);
-  if (!same.ok()) return same.status();
-  return *same ? Change::kNone : Change::kReplace;
+  HULLD_ASSIGN_OR_RETURN(const auto same, IsHullOf(*mesh, xyz));
+  return same ? Change::kNone : Change::kReplace;
 }
 
 absl::StatusOr<Change> CompareBody(const Client& client, const BodyDefinition& body) {
@@ -84,12 +75,11 @@ absl::Status PutHull(const Client& client, const std::string& hull_id,
 
 absl::Status PutAll(const Client& client, const SceneDescription& scene) {
   for (const HullDefinition& hull : scene.hulls) {
-    const auto xyz = PointsOf(hull);
-    if (!xyz.ok()) return xyz.status();
-    if (absl::Status put = PutHull(client, hull.hull_id, *xyz); !put.ok()) return put;
+    HULLD_ASSIGN_OR_RETURN(const auto xyz, PointsOf(hull));
+    HULLD_RETURN_IF_ERROR(PutHull(client, hull.hull_id, xyz));
   }
   for (const BodyDefinition& body : scene.bodies) {
-    if (absl::Status put = client.PutBody(BodyRequest(body)).status(); !put.ok()) return put;
+    HULLD_RETURN_IF_ERROR(client.PutBody(BodyRequest(body)).status());
   }
   return absl::OkStatus();
 }
@@ -106,16 +96,14 @@ absl::StatusOr<std::vector<Kept>> Strangers(const Client& client, const SceneDes
   };
   std::set<std::string> defined_bodies;
   for (const BodyDefinition& body : scene.bodies) defined_bodies.insert(body.body_id);
-  const auto bodies = client.ListAllBodies(scene.prefix);
-  if (!bodies.ok()) return bodies.status();
-  for (const v1::BodyInfo& body : bodies->bodies()) {
+  HULLD_ASSIGN_OR_RETURN(const auto bodies, client.ListAllBodies(scene.prefix));
+  for (const v1::BodyInfo& body : bodies.bodies()) {
     if (!defined_bodies.contains(body.body_id())) add(body.body_id(), true, body);
   }
   std::set<std::string> defined;
   for (const HullDefinition& hull : scene.hulls) defined.insert(hull.hull_id);
-  const auto list = client.ListAllHulls(scene.prefix);
-  if (!list.ok()) return list.status();
-  for (const v1::HullInfo& hull : list->hulls()) {
+  HULLD_ASSIGN_OR_RETURN(const auto list, client.ListAllHulls(scene.prefix));
+  for (const v1::HullInfo& hull : list.hulls()) {
     if (!defined.contains(hull.hull_id())) add(hull.hull_id(), false, hull);
   }
   return strangers;

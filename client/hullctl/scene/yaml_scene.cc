@@ -14,6 +14,8 @@
 #include "client/formats/text_number.h"
 #include "client/hullctl/help/suggestion.h"
 #include "client/hullctl/scene/yaml_reader.h"
+#include "client/packed_placements.h"
+#include "client/status_macros.h"
 
 namespace hulld {
 namespace {
@@ -39,9 +41,9 @@ class SceneParser {
   SceneParser(const YamlReader& yaml, std::string file) : yaml_(yaml), file_(std::move(file)) {}
 
   absl::StatusOr<SceneDescription> Run() {
-    const auto entries =
-        yaml_.EntriesOf(yaml_.root(), "the scene", {std::begin(kSceneKeys), std::end(kSceneKeys)});
-    if (!entries.ok()) return entries.status();
+    HULLD_ASSIGN_OR_RETURN(
+        const auto entries,
+        yaml_.EntriesOf(yaml_.root(), "the scene", {std::begin(kSceneKeys), std::end(kSceneKeys)}));
     using Part = absl::Status (SceneParser::*)(const YAML::Node&);
     // In order of dependency.
     const std::pair<const char*, Part> parts[] = {
@@ -50,9 +52,9 @@ class SceneParser {
         {"place", &SceneParser::TakePlaces},  {"ignore", &SceneParser::TakeIgnored},
         {"ask", &SceneParser::TakeAsk}};
     for (const auto& [key, take] : parts) {
-      for (const auto& [name, node] : *entries) {
+      for (const auto& [name, node] : entries) {
         if (name != key) continue;
-        if (absl::Status taken = (this->*take)(node); !taken.ok()) return taken;
+        HULLD_RETURN_IF_ERROR((this->*take)(node));
       }
     }
     return std::move(scene_);
@@ -62,41 +64,35 @@ class SceneParser {
   using Entries = YamlReader::Entries;
 
   absl::Status TakePrefix(const YAML::Node& node) {
-    auto prefix = yaml_.Text(node, "prefix");
-    if (!prefix.ok()) return prefix.status();
-    scene_.prefix = *std::move(prefix);
+    HULLD_ASSIGN_OR_RETURN(scene_.prefix, yaml_.Text(node, "prefix"));
     return absl::OkStatus();
   }
 
   absl::Status TakeScale(const YAML::Node& node) {
-    const auto scale = ScaleOf(node);
-    if (!scale.ok()) return scale.status();
-    scale_ = *scale;
+    HULLD_ASSIGN_OR_RETURN(scale_, ScaleOf(node));
     return absl::OkStatus();
   }
 
   absl::StatusOr<LengthScale> ScaleOf(const YAML::Node& node) const {
-    const auto text = yaml_.Text(node, "scale");
-    if (!text.ok()) return text.status();
+    HULLD_ASSIGN_OR_RETURN(const auto text, yaml_.Text(node, "scale"));
     for (const UnitName& unit : kUnits) {
-      if (*text == unit.name) return *LengthScale::FromText(unit.length);
+      if (text == unit.name) return *LengthScale::FromText(unit.length);
     }
-    if (const auto scale = LengthScale::FromText(*text); scale.has_value()) return *scale;
+    if (const auto scale = LengthScale::FromText(text); scale.has_value()) return *scale;
     return yaml_.ErrorAt(
-        node, absl::StrCat("scale: ", Quoted(*text),
+        node, absl::StrCat("scale: ", Quoted(text),
                            " is not a unit or a nonzero number; units are mm, cm, m, in, and ft"));
   }
 
   absl::Status TakeHulls(const YAML::Node& node) {
-    const auto entries = yaml_.EntriesOf(node, "hulls");
-    if (!entries.ok()) return entries.status();
-    for (const auto& [name, value] : *entries) {
+    HULLD_ASSIGN_OR_RETURN(const auto entries, yaml_.EntriesOf(node, "hulls"));
+    for (const auto& [name, value] : entries) {
       HullDefinition hull;
       hull.name = name;
       hull.hull_id = scene_.prefix + name;
       hull.scale = scale_;
       hull.where = yaml_.PlaceOf(value);
-      if (absl::Status taken = TakeHull(value, &hull); !taken.ok()) return taken;
+      HULLD_RETURN_IF_ERROR(TakeHull(value, &hull));
       hull_ids_[name] = hull.hull_id;
       scene_.hulls.push_back(std::move(hull));
     }
@@ -105,28 +101,23 @@ class SceneParser {
 
   absl::Status TakeHull(const YAML::Node& node, HullDefinition* hull) const {
     const std::string what = absl::StrCat("hull ", Quoted(hull->name));
-    const auto entries = yaml_.EntriesOf(node, what, {"file", "scale", "points", "box"});
-    if (!entries.ok()) return entries.status();
+    HULLD_ASSIGN_OR_RETURN(const auto entries,
+                           yaml_.EntriesOf(node, what, {"file", "scale", "points", "box"}));
     int sources = 0;
     bool scaled = false;
-    for (const auto& [key, value] : *entries) {
-      absl::Status taken;
+    for (const auto& [key, value] : entries) {
       if (key == "scale") {
-        const auto scale = ScaleOf(value);
-        if (!scale.ok()) return scale.status();
-        hull->scale = *scale;
+        HULLD_ASSIGN_OR_RETURN(hull->scale, ScaleOf(value));
         scaled = true;
         continue;
       }
       ++sources;
       if (key == "file") {
-        auto file = yaml_.Text(value, "file");
-        if (!file.ok()) return file.status();
-        hull->file = file->front() == '/' ? *file : FolderOf(file_) + *file;
+        HULLD_ASSIGN_OR_RETURN(const std::string file, yaml_.Text(value, "file"));
+        hull->file = file.front() == '/' ? file : FolderOf(file_) + file;
       } else {
-        taken = key == "box" ? TakeBox(value, hull) : TakePoints(value, hull);
+        HULLD_RETURN_IF_ERROR(key == "box" ? TakeBox(value, hull) : TakePoints(value, hull));
       }
-      if (!taken.ok()) return taken;
     }
     if (sources != 1) {
       return yaml_.ErrorAt(node, absl::StrCat(what, " needs exactly one of file, points, and box"));
@@ -139,14 +130,13 @@ class SceneParser {
 
   // Reads edge lengths; the box is centered on the origin.
   absl::Status TakeBox(const YAML::Node& node, HullDefinition* hull) const {
-    const auto size = yaml_.Numbers(node, "box", {3});
-    if (!size.ok()) return size.status();
-    for (const double edge : *size) {
+    HULLD_ASSIGN_OR_RETURN(const auto size, yaml_.Numbers(node, "box", {3}));
+    for (const double edge : size) {
       if (edge < 0) return yaml_.ErrorAt(node, "box edges must be at least 0");
     }
     for (int corner = 0; corner < 8; ++corner) {
       for (size_t axis = 0; axis < 3; ++axis) {
-        const double half = (*size)[axis] / 2;
+        const double half = size[axis] / 2;
         hull->xyz.push_back((corner >> axis) % 2 == 0 ? -half : half);
       }
     }
@@ -158,9 +148,8 @@ class SceneParser {
       return yaml_.ErrorAt(node, "points must be a list of points, as in [[0, 0, 0], [1, 0, 0]]");
     }
     for (const YAML::Node& point : node) {
-      const auto xyz = yaml_.Numbers(point, "a point", {3});
-      if (!xyz.ok()) return xyz.status();
-      hull->xyz.insert(hull->xyz.end(), xyz->begin(), xyz->end());
+      HULLD_ASSIGN_OR_RETURN(const auto xyz, yaml_.Numbers(point, "a point", {3}));
+      hull->xyz.insert(hull->xyz.end(), xyz.begin(), xyz.end());
     }
     return absl::OkStatus();
   }
@@ -170,19 +159,17 @@ class SceneParser {
   absl::StatusOr<RigidPose> PoseOf(const YAML::Node& node, const std::string& key_of_pose = "at",
                                    RigidPose pose = kNoMotion) const {
     if (!node.IsMap()) {
-      const auto numbers = yaml_.Numbers(node, key_of_pose, {3, 7});
-      if (!numbers.ok()) return numbers.status();
-      std::copy(numbers->begin(), numbers->end(), pose.end() - numbers->size());
+      HULLD_ASSIGN_OR_RETURN(const auto numbers, yaml_.Numbers(node, key_of_pose, {3, 7}));
+      std::copy(numbers.begin(), numbers.end(), pose.end() - numbers.size());
       return CheckedPose(node, key_of_pose, pose);
     }
-    const auto entries = yaml_.EntriesOf(node, key_of_pose, {"xyz", "rpy", "quaternion"});
-    if (!entries.ok()) return entries.status();
+    HULLD_ASSIGN_OR_RETURN(const auto entries,
+                           yaml_.EntriesOf(node, key_of_pose, {"xyz", "rpy", "quaternion"}));
     int rotations = 0;
-    for (const auto& [key, value] : *entries) {
+    for (const auto& [key, value] : entries) {
       const size_t count = key == "quaternion" ? 4 : 3;
-      const auto numbers = yaml_.Numbers(value, key, {count});
-      if (!numbers.ok()) return numbers.status();
-      const double* const x = numbers->data();
+      HULLD_ASSIGN_OR_RETURN(const auto numbers, yaml_.Numbers(value, key, {count}));
+      const double* const x = numbers.data();
       if (key == "xyz") {
         std::copy(x, x + 3, pose.begin() + 4);
       } else if (key == "quaternion") {
@@ -212,16 +199,8 @@ class SceneParser {
   absl::StatusOr<RigidPose> EndOf(const YAML::Node& node, const RigidPose& X_WO) const {
     RigidPose start = X_WO;
     std::fill(start.begin() + 4, start.end(), 0);
-    auto end = PoseOf(node, "to", start);
-    if (!end.ok()) return end;
-    const auto largest = [](const RigidPose& pose) {
-      return std::max({std::abs(pose[0]), std::abs(pose[1]), std::abs(pose[2]), std::abs(pose[3])});
-    };
-    double cosine = 0;
-    for (size_t i = 0; i < 4; ++i)
-      cosine += start[i] / largest(start) * ((*end)[i] / largest(*end));
-    if (cosine < 0) std::transform(end->begin(), end->begin() + 4, end->begin(), std::negate<>());
-    return end;
+    HULLD_ASSIGN_OR_RETURN(const RigidPose end, PoseOf(node, "to", start));
+    return OnShorterPath(X_WO, end);
   }
 
   // Reads a length of at least 0. YamlReader refuses numbers that are not finite.
@@ -235,22 +214,13 @@ class SceneParser {
 
   // Returns the ID of a hull defined in the file.
   absl::StatusOr<std::string> DefinedHull(const YAML::Node& node) const {
-    const auto name = yaml_.Text(node, "hull");
-    if (!name.ok()) return name.status();
-    const auto found = hull_ids_.find(*name);
-    if (found != hull_ids_.end()) return found->second;
-    std::vector<std::string> known;
-    for (const auto& [defined, id] : hull_ids_) known.push_back(defined);
-    const std::string hint = Suggestion(*name, known);
-    return yaml_.ErrorAt(node,
-                         absl::StrCat("hull ", Quoted(*name), " is not defined under hulls",
-                                      hint.empty() ? "; use id for a hull of the server" : hint));
+    HULLD_ASSIGN_OR_RETURN(const std::string name, yaml_.Text(node, "hull"));
+    return Find(node, name, hull_ids_, "hull", "hulls", "; use id for a hull of the server");
   }
 
   absl::Status TakeBodies(const YAML::Node& node) {
-    const auto entries = yaml_.EntriesOf(node, "bodies");
-    if (!entries.ok()) return entries.status();
-    for (const auto& [name, value] : *entries) {
+    HULLD_ASSIGN_OR_RETURN(const auto entries, yaml_.EntriesOf(node, "bodies"));
+    for (const auto& [name, value] : entries) {
       if (hull_ids_.contains(name)) {
         return yaml_.ErrorAt(
             value, absl::StrCat("hull ", Quoted(name),
@@ -267,7 +237,7 @@ class SceneParser {
       }
       std::set<std::string> taken;
       for (const YAML::Node& piece : value) {
-        if (absl::Status added = TakePiece(piece, &taken, &body); !added.ok()) return added;
+        HULLD_RETURN_IF_ERROR(TakePiece(piece, &taken, &body));
       }
       bodies_[name] = static_cast<int>(scene_.bodies.size());
       scene_.bodies.push_back(std::move(body));
@@ -278,28 +248,23 @@ class SceneParser {
   absl::Status TakePiece(const YAML::Node& node, std::set<std::string>* taken,
                          BodyDefinition* body) const {
     const std::string what = absl::StrCat("a piece of body ", Quoted(body->name));
-    const auto entries = yaml_.EntriesOf(node, what, {"hull", "id", "at", "radius"});
-    if (!entries.ok()) return entries.status();
+    HULLD_ASSIGN_OR_RETURN(const auto entries,
+                           yaml_.EntriesOf(node, what, {"hull", "id", "at", "radius"}));
     PieceDefinition piece;
-    for (const auto& [key, value] : *entries) {
+    for (const auto& [key, value] : entries) {
       if (key == "at") {
-        const auto pose = PoseOf(value);
-        if (!pose.ok()) return pose.status();
-        piece.X_BP = *pose;
+        HULLD_ASSIGN_OR_RETURN(piece.X_BP, PoseOf(value));
         continue;
       }
       if (key == "radius") {
-        const auto radius = LengthOf(value, key);
-        if (!radius.ok()) return radius.status();
-        piece.radius = *radius;
+        HULLD_ASSIGN_OR_RETURN(piece.radius, LengthOf(value, key));
         continue;
       }
       if (!piece.hull_id.empty())
         return yaml_.ErrorAt(value, what + " may have hull or id, not both");
-      auto id = key == "hull" ? DefinedHull(value) : yaml_.Text(value, "id");
-      if (!id.ok()) return id.status();
+      HULLD_ASSIGN_OR_RETURN(auto id, key == "hull" ? DefinedHull(value) : yaml_.Text(value, "id"));
       piece.name = value.Scalar();
-      piece.hull_id = *std::move(id);
+      piece.hull_id = std::move(id);
     }
     if (piece.hull_id.empty()) return yaml_.ErrorAt(node, what + " needs hull or id");
     const std::string name = piece.name;
@@ -311,12 +276,11 @@ class SceneParser {
   }
 
   absl::Status TakePlaces(const YAML::Node& node) {
-    const auto entries = yaml_.EntriesOf(node, "place");
-    if (!entries.ok()) return entries.status();
-    for (const auto& [name, value] : *entries) {
+    HULLD_ASSIGN_OR_RETURN(const auto entries, yaml_.EntriesOf(node, "place"));
+    for (const auto& [name, value] : entries) {
       PlacementDefinition placement;
       placement.name = name;
-      if (absl::Status taken = TakePlace(value, &placement); !taken.ok()) return taken;
+      HULLD_RETURN_IF_ERROR(TakePlace(value, &placement));
       pieces_ +=
           placement.body < 0 ? 1 : scene_.bodies[static_cast<size_t>(placement.body)].pieces.size();
       if (pieces_ > kMaxPieces) {
@@ -326,7 +290,7 @@ class SceneParser {
       if (!placement.group.empty()) groups_.insert(placement.group);
       scene_.placements.push_back(std::move(placement));
     }
-    for (const auto& [name, value] : *entries) {
+    for (const auto& [name, value] : entries) {
       if (!groups_.contains(name)) continue;
       return yaml_.ErrorAt(
           value, absl::StrCat(Quoted(name), " names both a placement and a group; ", "rename one"));
@@ -336,71 +300,62 @@ class SceneParser {
 
   absl::Status TakePlace(const YAML::Node& node, PlacementDefinition* placement) const {
     const std::string what = absl::StrCat("placement ", Quoted(placement->name));
-    const auto entries =
-        yaml_.EntriesOf(node, what, {"hull", "body", "id", "at", "to", "radius", "group"});
-    if (!entries.ok()) return entries.status();
+    HULLD_ASSIGN_OR_RETURN(
+        const auto entries,
+        yaml_.EntriesOf(node, what, {"hull", "body", "id", "at", "to", "radius", "group"}));
     int objects = 0;
     std::optional<YAML::Node> to;
-    for (const auto& [key, value] : *entries) {
+    for (const auto& [key, value] : entries) {
       if (key == "to") {
         to = value;
         continue;
       }
       if (key == "at") {
-        const auto pose = PoseOf(value);
-        if (!pose.ok()) return pose.status();
-        placement->X_WO = *pose;
+        HULLD_ASSIGN_OR_RETURN(placement->X_WO, PoseOf(value));
         continue;
       }
       if (key == "radius") {
-        const auto radius = LengthOf(value, key);
-        if (!radius.ok()) return radius.status();
-        placement->radius = *radius;
+        HULLD_ASSIGN_OR_RETURN(placement->radius, LengthOf(value, key));
         continue;
       }
       if (key == "group") {
-        auto group = yaml_.Text(value, "group");
-        if (!group.ok()) return group.status();
-        placement->group = *std::move(group);
+        HULLD_ASSIGN_OR_RETURN(placement->group, yaml_.Text(value, "group"));
         continue;
       }
       ++objects;
       if (key == "body") {
-        const auto body = BodyOf(value);
-        if (!body.ok()) return body.status();
-        placement->body = *body;
+        HULLD_ASSIGN_OR_RETURN(placement->body, BodyOf(value));
         continue;
       }
-      auto id = key == "hull" ? DefinedHull(value) : yaml_.Text(value, "id");
-      if (!id.ok()) return id.status();
-      placement->hull_id = *std::move(id);
+      HULLD_ASSIGN_OR_RETURN(placement->hull_id,
+                             key == "hull" ? DefinedHull(value) : yaml_.Text(value, "id"));
     }
     if (objects != 1) {
       return yaml_.ErrorAt(node, what + " needs exactly one of hull, body, and id");
     }
     if (!to.has_value()) return absl::OkStatus();
-    const auto end = EndOf(*to, placement->X_WO);
-    if (!end.ok()) return end.status();
-    placement->X_WO_end = *end;
+    HULLD_ASSIGN_OR_RETURN(placement->X_WO_end, EndOf(*to, placement->X_WO));
     return absl::OkStatus();
   }
 
   absl::StatusOr<int> BodyOf(const YAML::Node& node) const {
-    const auto name = yaml_.Text(node, "body");
-    if (!name.ok()) return name.status();
-    return Find(node, *name, bodies_, "body", "bodies");
+    HULLD_ASSIGN_OR_RETURN(const auto name, yaml_.Text(node, "body"));
+    return Find(node, name, bodies_, "body", "bodies");
   }
 
-  absl::StatusOr<int> Find(const YAML::Node& node, const std::string& name,
-                           const std::map<std::string, int>& among, const char* what,
-                           const char* where) const {
+  // Returns the value of a name defined under the key `where`. advice: in the error, if no other
+  // name is similar.
+  template <typename Value>
+  absl::StatusOr<Value> Find(const YAML::Node& node, const std::string& name,
+                             const std::map<std::string, Value>& among, const char* what,
+                             const char* where, const char* advice = "") const {
     const auto found = among.find(name);
     if (found != among.end()) return found->second;
     std::vector<std::string> known;
-    known.reserve(among.size());
-    for (const auto& [key, index] : among) known.push_back(key);
+    for (const auto& [key, value] : among) known.push_back(key);
+    const std::string hint = Suggestion(name, known);
     return yaml_.ErrorAt(node, absl::StrCat(what, " ", Quoted(name), " is not defined under ",
-                                            where, Suggestion(name, known)));
+                                            where, hint.empty() ? advice : hint));
   }
 
   absl::StatusOr<std::vector<std::string>> TwoNames(const YAML::Node& node,
@@ -417,10 +372,9 @@ class SceneParser {
       return yaml_.ErrorAt(node, "ignore must be a list of pairs, as in [[a, b]]");
     }
     for (const YAML::Node& entry : node) {
-      auto names = TwoNames(entry, "ignore");
-      if (!names.ok()) return names.status();
+      HULLD_ASSIGN_OR_RETURN(auto names, TwoNames(entry, "ignore"));
       for (size_t i = 0; i < 2; ++i) {
-        const std::string& name = (*names)[i];
+        const std::string& name = names[i];
         if (places_.contains(name) || groups_.contains(name)) continue;
         std::vector<std::string> known(groups_.begin(), groups_.end());
         for (const auto& [place, index] : places_) known.push_back(place);
@@ -428,22 +382,21 @@ class SceneParser {
                              absl::StrCat("ignore: ", Quoted(name), " is not a placement or group",
                                           Suggestion(name, known)));
       }
-      scene_.ignored.emplace_back((*names)[0], (*names)[1]);
+      scene_.ignored.emplace_back(names[0], names[1]);
     }
     return absl::OkStatus();
   }
 
   absl::Status TakeAsk(const YAML::Node& node) {
-    const auto entries =
+    HULLD_ASSIGN_OR_RETURN(
+        const auto entries,
         yaml_.EntriesOf(node, "ask",
                         {"pairs", "movers", "axis", "separation", "max_error", "witness", "normal",
-                         "certificate", "analysis", "clearance", "tolerance"});
-    if (!entries.ok()) return entries.status();
-    for (const auto& [key, value] : *entries) {
-      absl::Status taken = key == "pairs"    ? TakePairs(value)
-                           : key == "movers" ? TakeMovers(value)
-                                             : TakeQueryOption(key, value);
-      if (!taken.ok()) return taken;
+                         "certificate", "analysis", "clearance", "tolerance"}));
+    for (const auto& [key, value] : entries) {
+      HULLD_RETURN_IF_ERROR(key == "pairs"    ? TakePairs(value)
+                            : key == "movers" ? TakeMovers(value)
+                                              : TakeQueryOption(key, value));
     }
     if (scene_.pairs.has_value() && !scene_.movers.empty()) {
       return yaml_.ErrorAt(node, "ask: pairs and movers cannot be combined");
@@ -457,13 +410,10 @@ class SceneParser {
     }
     scene_.pairs.emplace();
     for (const YAML::Node& entry : node) {
-      const auto names = TwoNames(entry, "pairs");
-      if (!names.ok()) return names.status();
+      HULLD_ASSIGN_OR_RETURN(const auto names, TwoNames(entry, "pairs"));
       int side[2] = {0, 0};
       for (size_t i = 0; i < 2; ++i) {
-        const auto place = Find(entry[i], (*names)[i], places_, "placement", "place");
-        if (!place.ok()) return place.status();
-        side[i] = *place;
+        HULLD_ASSIGN_OR_RETURN(side[i], Find(entry[i], names[i], places_, "placement", "place"));
       }
       scene_.pairs->emplace_back(side[0], side[1]);
     }
@@ -471,38 +421,35 @@ class SceneParser {
   }
 
   absl::Status TakeMovers(const YAML::Node& node) {
-    const auto names = yaml_.Texts(node, "movers");
-    if (!names.ok()) return names.status();
-    for (size_t i = 0; i < names->size(); ++i) {
-      const auto place = Find(node[i], (*names)[i], places_, "placement", "place");
-      if (!place.ok()) return place.status();
+    HULLD_ASSIGN_OR_RETURN(const auto names, yaml_.Texts(node, "movers"));
+    for (size_t i = 0; i < names.size(); ++i) {
+      HULLD_ASSIGN_OR_RETURN(const auto place,
+                             Find(node[i], names[i], places_, "placement", "place"));
       std::vector<int>& movers = scene_.movers;
-      if (std::find(movers.begin(), movers.end(), *place) == movers.end()) movers.push_back(*place);
+      if (std::find(movers.begin(), movers.end(), place) == movers.end()) movers.push_back(place);
     }
     return absl::OkStatus();
   }
 
   absl::Status TakeQueryOption(const std::string& key, const YAML::Node& node) {
     if (key == "max_error" || key == "clearance" || key == "tolerance") {
-      const auto length = LengthOf(node, key);
-      if (!length.ok()) return length.status();
+      HULLD_ASSIGN_OR_RETURN(const auto length, LengthOf(node, key));
       if (key == "tolerance") {
-        scene_.tolerance = *length;
+        scene_.tolerance = length;
       } else if (key == "clearance") {
-        scene_.wanted.set_clearance(*length);
+        scene_.wanted.set_clearance(length);
       } else {
-        scene_.wanted.set_max_error(*length);
+        scene_.wanted.set_max_error(length);
       }
       return absl::OkStatus();
     }
-    const auto truth = yaml_.Truth(node, key);
-    if (!truth.ok()) return truth.status();
-    if (key == "axis") scene_.wanted.set_axis(*truth);
-    if (key == "separation") scene_.wanted.set_separation(*truth);
-    if (key == "witness") scene_.wanted.set_witness(*truth);
-    if (key == "normal") scene_.wanted.set_normal(*truth);
-    if (key == "certificate") scene_.wanted.set_certificate(*truth);
-    if (key == "analysis") scene_.wanted.set_analysis(*truth);
+    HULLD_ASSIGN_OR_RETURN(const auto truth, yaml_.Truth(node, key));
+    if (key == "axis") scene_.wanted.set_axis(truth);
+    if (key == "separation") scene_.wanted.set_separation(truth);
+    if (key == "witness") scene_.wanted.set_witness(truth);
+    if (key == "normal") scene_.wanted.set_normal(truth);
+    if (key == "certificate") scene_.wanted.set_certificate(truth);
+    if (key == "analysis") scene_.wanted.set_analysis(truth);
     return absl::OkStatus();
   }
 
@@ -559,19 +506,9 @@ class Classes {
 };
 
 v1::Pose PoseMessage(const RigidPose& X_WP) {
-  v1::Pose pose;
+  v1::Pose pose = PoseOf(X_WP);
   // (w, 0, 0, 0) is the rotation of an absent quaternion, but its length matters in a motion.
-  if (X_WP[0] != 1 || X_WP[1] != 0 || X_WP[2] != 0 || X_WP[3] != 0) {
-    v1::Quaternion& rotation = *pose.mutable_rotation();
-    rotation.set_w(X_WP[0]);
-    rotation.set_x(X_WP[1]);
-    rotation.set_y(X_WP[2]);
-    rotation.set_z(X_WP[3]);
-  }
-  v1::Vector3& translation = *pose.mutable_translation();
-  translation.set_x(X_WP[4]);
-  translation.set_y(X_WP[5]);
-  translation.set_z(X_WP[6]);
+  if (std::equal(kNoMotion.begin(), kNoMotion.begin() + 4, X_WP.begin())) pose.clear_rotation();
   return pose;
 }
 
@@ -626,15 +563,13 @@ v1::PutBodyRequest BodyRequest(const BodyDefinition& body) {
 }
 
 absl::StatusOr<SceneDescription> ParseYamlScene(const std::string& text, const std::string& name) {
-  const auto yaml = YamlReader::Parse(text, name);
-  if (!yaml.ok()) return yaml.status();
-  return SceneParser(*yaml, name).Run();
+  HULLD_ASSIGN_OR_RETURN(const auto yaml, YamlReader::Parse(text, name));
+  return SceneParser(yaml, name).Run();
 }
 
 absl::StatusOr<SceneDescription> ReadYamlScene(const std::string& path) {
-  const auto text = ReadText(path);
-  if (!text.ok()) return text.status();
-  return ParseYamlScene(*text, path);
+  HULLD_ASSIGN_OR_RETURN(const auto text, ReadText(path));
+  return ParseYamlScene(text, path);
 }
 
 absl::StatusOr<Scene> ToScene(const SceneDescription& description, const std::string& name,

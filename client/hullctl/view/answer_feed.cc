@@ -1,7 +1,6 @@
 #include "client/hullctl/view/answer_feed.h"
 
 #include <absl/strings/str_cat.h>
-#include <absl/strings/str_join.h>
 
 #include <algorithm>
 #include <utility>
@@ -9,6 +8,7 @@
 #include "client/hullctl/printing/answer_row.h"
 #include "client/hullctl/printing/json.h"
 #include "client/packed_placements.h"
+#include "client/status_macros.h"
 
 namespace hulld {
 namespace {
@@ -17,20 +17,6 @@ namespace {
 constexpr size_t kMaxObjectsInMotion = 3000;
 // Maximum number of colliding pairs that the page lists and highlights; totals count all.
 constexpr size_t kMaxListedPairs = 5000;
-
-v1::Pose ToPose(const Pose7& numbers) {
-  v1::Pose pose;
-  v1::Quaternion* const q = pose.mutable_rotation();
-  q->set_w(numbers[0]);
-  q->set_x(numbers[1]);
-  q->set_y(numbers[2]);
-  q->set_z(numbers[3]);
-  v1::Vector3* const t = pose.mutable_translation();
-  t->set_x(numbers[4]);
-  t->set_y(numbers[5]);
-  t->set_z(numbers[6]);
-  return pose;
-}
 
 v1::Wanted WantedOfPair(bool certificate) {
   v1::Wanted wanted;
@@ -189,7 +175,7 @@ v1::Placement PlacementOf(const ViewObject& object) {
     placement.mutable_points()->mutable_xyz()->Add(object.hull->xyz.begin(),
                                                    object.hull->xyz.end());
   }
-  *placement.mutable_pose() = ToPose(object.pose);
+  *placement.mutable_pose() = PoseOf(object.pose);
   placement.set_radius(object.radius);
   return placement;
 }
@@ -198,8 +184,8 @@ v1::Placement PlacementOf(const ViewObject& object) {
 v1::Placement MotionOf(const ViewObject& object) {
   v1::Placement placement = PlacementOf(object);
   if (!object.motion) return placement;
-  *placement.mutable_pose() = ToPose(object.motion->start);
-  *placement.mutable_end_pose() = ToPose(object.motion->end);
+  *placement.mutable_pose() = PoseOf(object.motion->start);
+  *placement.mutable_end_pose() = PoseOf(object.motion->end);
   return placement;
 }
 
@@ -304,10 +290,10 @@ std::string MotionAnswerJson(std::pair<uint32_t, uint32_t> pair, const ViewObjec
       .AddJson("update", std::to_string(update))
       .AddJson("pair", PairJson(pair))
       .AddJson("poses", PosesJson({start(a), start(b)}))
-      .AddJson("hulls", absl::StrCat("[", absl::StrJoin(hulls, ","), "]"))
+      .AddJson("hulls", JsonArray(hulls))
       .Add("relation", v1::Relation_Name(response->relation()))
       .AddJson("firstContact", MessageJson(response->first_contact()))
-      .AddJson("pieceCertificates", absl::StrCat("[", absl::StrJoin(certificates, ","), "]"));
+      .AddJson("pieceCertificates", JsonArray(certificates));
   if (response->has_certificate()) {
     message.AddJson("certificate", MessageJson(response->certificate()));
   }
@@ -319,17 +305,15 @@ absl::StatusOr<std::string> SceneAnswerJson(const Client& client,
                                             const std::optional<std::vector<uint32_t>>& pairs,
                                             const std::vector<ViewObject>& objects,
                                             double tolerance, uint64_t update) {
-  const auto answer = AskScene(client, rules, pairs, objects, tolerance);
-  if (!answer.ok()) return answer.status();
-  return answer->Json(update);
+  HULLD_ASSIGN_OR_RETURN(const auto answer, AskScene(client, rules, pairs, objects, tolerance));
+  return answer.Json(update);
 }
 
 absl::StatusOr<bool> AnyCollides(const Client& client, const v1::FindCollisionsRequest& rules,
                                  const std::optional<std::vector<uint32_t>>& pairs,
                                  const std::vector<ViewObject>& objects) {
-  const auto answer = AskScene(client, rules, pairs, objects, 0);
-  if (!answer.ok()) return answer.status();
-  return answer->has_pairs();
+  HULLD_ASSIGN_OR_RETURN(const auto answer, AskScene(client, rules, pairs, objects, 0));
+  return answer.has_pairs();
 }
 
 AnswerFeed::AnswerFeed(const Client& client, std::shared_ptr<PageChannel> page)
@@ -422,14 +406,13 @@ bool AnswerFeed::AnswerPair(const Question& question) {
 absl::StatusOr<std::string> AnswerFeed::RestingAnswer(const Question& question) const {
   const ViewObject& a = question.objects[question.pair->first];
   const ViewObject& b = question.objects[question.pair->second];
-  const auto response = client_.CheckCollision(PairRequest(a, b, question.certificate));
-  if (!response.ok()) return response.status();
+  HULLD_ASSIGN_OR_RETURN(const auto response,
+                         client_.CheckCollision(PairRequest(a, b, question.certificate)));
   if (question.tolerance == 0) {
-    return PairAnswerJson(*question.pair, a, b, question.update, *response);
+    return PairAnswerJson(*question.pair, a, b, question.update, response);
   }
-  const auto tolerant = TolerantAnswer(question);
-  if (!tolerant.ok()) return tolerant.status();
-  return PairAnswerJson(*question.pair, a, b, question.update, *response, *tolerant);
+  HULLD_ASSIGN_OR_RETURN(const auto tolerant, TolerantAnswer(question));
+  return PairAnswerJson(*question.pair, a, b, question.update, response, tolerant);
 }
 
 absl::StatusOr<std::string> AnswerFeed::TolerantAnswer(const Question& question) const {
@@ -439,12 +422,11 @@ absl::StatusOr<std::string> AnswerFeed::TolerantAnswer(const Question& question)
   // A tolerance excludes wanted fields.
   request.clear_wanted();
   request.set_tolerance(question.tolerance);
-  const auto response = client_.CheckCollision(request);
-  if (!response.ok()) return response.status();
+  HULLD_ASSIGN_OR_RETURN(const auto response, client_.CheckCollision(request));
   return JsonObject()
       .AddJson("tolerance", NumbersJson(&question.tolerance, 1))
-      .Add("relation", v1::Relation_Name(response->relation()))
-      .Add("rung", v1::Rung_Name(response->rung()))
+      .Add("relation", v1::Relation_Name(response.relation()))
+      .Add("rung", v1::Rung_Name(response.rung()))
       .Close();
 }
 

@@ -7,32 +7,28 @@
 #include "client/check.h"
 #include "client/hullctl/printing/json.h"
 #include "client/point_messages.h"
+#include "client/status_macros.h"
 
 namespace hulld {
 namespace {
 
 absl::StatusOr<std::string> ApplyAppend(const Client& client, const ViewEdit& edit) {
-  const auto appender = client.OpenAppend(edit.hull_id);
-  if (!appender.ok()) return appender.status();
-  const absl::Status sent = SendInMessages(
-      edit.points, [&](v1::PointBlock points) { return (*appender)->Append(std::move(points)); });
-  if (!sent.ok()) return sent;
-  if (absl::Status status = (*appender)->Finish(); !status.ok()) return status;
-  const AppendTotals& totals = (*appender)->totals();
+  HULLD_ASSIGN_OR_RETURN(const auto appender, client.OpenAppend(edit.hull_id));
+  HULLD_RETURN_IF_ERROR(SendInMessages(
+      edit.points, [&](v1::PointBlock points) { return appender->Append(std::move(points)); }));
+  HULLD_RETURN_IF_ERROR(appender->Finish());
+  const AppendTotals& totals = appender->totals();
   return absl::StrCat(edit.hull_id, ": ", totals.counts.received(), " appended, ",
                       totals.counts.outside(), " outside; now at revision ", totals.hull_revision);
 }
 
 absl::StatusOr<std::string> ApplyDelete(const Client& client, const ViewEdit& edit) {
-  const auto deleted = client.DeleteHull(edit.hull_id);
-  if (!deleted.ok()) return deleted.status();
+  HULLD_ASSIGN_OR_RETURN(const auto deleted, client.DeleteHull(edit.hull_id));
   return absl::StrCat(edit.hull_id, " was deleted");
 }
 
 std::string EditedMessage(const ViewEdit& edit, const absl::StatusOr<std::string>& outcome) {
-  const std::string message = outcome.ok() ? *outcome
-                                           : std::string(outcome.status().message().data(),
-                                                         outcome.status().message().size());
+  const std::string message = outcome.ok() ? *outcome : std::string(outcome.status().message());
   return TextMessage("edited", {{"hullId", QuoteJson(edit.hull_id)},
                                 {"done", outcome.ok() ? "true" : "false"},
                                 {"message", QuoteJson(message)}});

@@ -11,8 +11,8 @@
 #include <span>
 
 #include "client/formats/text_number.h"
-#include "client/hullctl/body/body_pieces.h"
 #include "client/hullctl/printing/json.h"
+#include "client/packed_placements.h"
 
 namespace hulld {
 namespace {

@@ -9,26 +9,19 @@
 #include <utility>
 
 #include "client/formats/byte_source.h"
-#include "client/formats/mesh_file.h"
 #include "client/formats/point_file.h"
 #include "client/formats/text_number.h"
-#include "client/hullctl/body/body_pieces.h"
 #include "client/hullctl/local/file_shape.h"
 #include "client/hullctl/scene/scene_file.h"
+#include "client/packed_placements.h"
+#include "client/status_macros.h"
 
 namespace hulld {
 namespace {
 
 absl::Status ReadMeshShape(const std::string& path, FileShape* shape) {
-  const auto mesh = ReadMesh(path);
-  if (!mesh.ok()) return mesh.status();
-  shape->point_count = mesh->vertices.size();
-  for (const auto& vertex : mesh->vertices) {
-    shape->xyz.insert(shape->xyz.end(), vertex.begin(), vertex.end());
-  }
-  for (const auto& triangle : mesh->triangles) {
-    shape->triangles.insert(shape->triangles.end(), triangle.begin(), triangle.end());
-  }
+  HULLD_ASSIGN_OR_RETURN(const TriangleMesh mesh, ReadMesh(path));
+  SetMesh(mesh, shape);
   return absl::OkStatus();
 }
 
@@ -72,18 +65,27 @@ Pose7 PoseAt(const ViewMotion& motion, double t) {
   return pose;
 }
 
+void SetMesh(const TriangleMesh& mesh, FileShape* shape) {
+  shape->point_count = mesh.vertices.size();
+  for (const auto& vertex : mesh.vertices) {
+    shape->xyz.insert(shape->xyz.end(), vertex.begin(), vertex.end());
+  }
+  for (const auto& triangle : mesh.triangles) {
+    shape->triangles.insert(shape->triangles.end(), triangle.begin(), triangle.end());
+  }
+}
+
 std::string ShownName(const std::string& path) {
   return Printable(std::filesystem::path(path).filename().string());
 }
 
 absl::StatusOr<FileShape> ReadShape(const std::string& path) {
-  const auto format = PointFormatOfPath(path);
-  if (!format.ok()) return format.status();
+  HULLD_ASSIGN_OR_RETURN(const auto format, PointFormatOfPath(path));
   FileShape shape;
   shape.name = ShownName(path);
-  absl::Status read = IsMeshFormat(*format) ? ReadMeshShape(path, &shape) : absl::OkStatus();
+  absl::Status read = IsMeshFormat(format) ? ReadMeshShape(path, &shape) : absl::OkStatus();
   // A PLY file without faces is a cloud.
-  if (read.ok() && shape.xyz.empty()) read = ReadPointShape(path, *format, &shape);
+  if (read.ok() && shape.xyz.empty()) read = ReadPointShape(path, format, &shape);
   if (!read.ok()) return read;
   return shape;
 }
@@ -119,20 +121,18 @@ bool IsSceneFile(const std::string& path) {
 
 absl::Status AddHullsAndBodies(const Client& client, const std::string& id_or_prefix,
                                ViewScene* scene) {
-  const auto hulls = client.ListAllHulls(id_or_prefix);
-  if (!hulls.ok()) return hulls.status();
-  const auto bodies = client.ListAllBodies(id_or_prefix);
-  if (!bodies.ok()) return bodies.status();
+  HULLD_ASSIGN_OR_RETURN(const auto hulls, client.ListAllHulls(id_or_prefix));
+  HULLD_ASSIGN_OR_RETURN(const auto bodies, client.ListAllBodies(id_or_prefix));
   std::vector<std::string> ids;
   std::unordered_set<std::string> pieces;
-  for (const v1::BodyInfo& body : bodies->bodies()) {
+  for (const v1::BodyInfo& body : bodies.bodies()) {
     ids.push_back(body.body_id());
     // Without permission to read its pieces, the page reports that for the body itself.
     const auto whole = client.GetBody(body.body_id());
     if (!whole.ok()) continue;
     for (const v1::Placement& piece : whole->pieces()) pieces.insert(piece.hull_id());
   }
-  for (const v1::HullInfo& hull : hulls->hulls()) ids.push_back(hull.hull_id());
+  for (const v1::HullInfo& hull : hulls.hulls()) ids.push_back(hull.hull_id());
   if (ids.empty() && !id_or_prefix.empty()) {
     return absl::NotFoundError(
         absl::StrCat("no hull, body, prefix, or file \"", id_or_prefix, "\""));
@@ -160,13 +160,12 @@ namespace {
 absl::Status AddShapes(const std::vector<size_t>& indices,
                        const std::vector<v1::PointBlock>& shapes, ViewScene* scene) {
   if (shapes.empty()) return absl::OkStatus();
-  auto hulls = HullsOfShapes(shapes);
-  if (!hulls.ok()) return hulls.status();
+  HULLD_ASSIGN_OR_RETURN(auto hulls, HullsOfShapes(shapes));
   for (size_t i = 0; i < indices.size(); ++i) {
     ViewObject& object = scene->objects[indices[i]];
     auto file = std::make_shared<FileShape>();
     file->name = object.name;
-    file->hull = std::make_shared<const HullMesh>(std::move((*hulls)[i]));
+    file->hull = std::make_shared<const HullMesh>(std::move(hulls[i]));
     file->xyz = file->hull->xyz;
     file->point_count = file->hull->vertex_count();
     file->hull_name = object.name;
@@ -181,17 +180,15 @@ absl::Status AddShapes(const std::vector<size_t>& indices,
 }  // namespace
 
 absl::Status AddSceneFile(const std::string& path, ViewScene* scene) {
-  const auto source = ByteSource::Open(path);
-  if (!source.ok()) return source.status();
-  absl::StatusOr<Scene> file = ReadScene(source->get());
-  if (!file.ok()) return file.status();
+  HULLD_ASSIGN_OR_RETURN(const auto source, ByteSource::Open(path));
+  HULLD_ASSIGN_OR_RETURN(Scene file, ReadScene(source.get()));
   std::vector<size_t> indices;
   std::vector<v1::PointBlock> shapes;
-  for (uint32_t i = 0; i < file->size(); ++i) {
-    const std::string& hull_id = *file->HullOf(i);
-    v1::Placement placement = file->PlacementOf(i);
+  for (uint32_t i = 0; i < file.size(); ++i) {
+    const std::string& hull_id = *file.HullOf(i);
+    v1::Placement placement = file.PlacementOf(i);
     const std::string& name =
-        file->names.empty() && !placement.has_points() ? hull_id : file->NameOf(i);
+        file.names.empty() && !placement.has_points() ? hull_id : file.NameOf(i);
     ViewObject& object = scene->objects.emplace_back(
         ViewObject{name, hull_id, -1, NumbersOf(placement.pose()), placement.radius()});
     if (placement.has_end_pose()) {
@@ -202,9 +199,9 @@ absl::Status AddSceneFile(const std::string& path, ViewScene* scene) {
     indices.push_back(scene->objects.size() - 1);
     shapes.push_back(std::move(*placement.mutable_points()));
   }
-  if (absl::Status added = AddShapes(indices, shapes, scene); !added.ok()) return added;
-  scene->pairs = std::move(file->pairs);
-  scene->rules = std::move(file->request);
+  HULLD_RETURN_IF_ERROR(AddShapes(indices, shapes, scene));
+  scene->pairs = std::move(file.pairs);
+  scene->rules = std::move(file.request);
   scene->rules.clear_placements();
   scene->rules.clear_packed_placements();
   // The page shows only relations here.

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "client/client.h"
+#include "client/formats/mesh_file.h"
 #include "hulld/v1/collision.pb.h"
 
 namespace hulld {
@@ -106,6 +107,9 @@ struct ViewScene {
 // Reads a mesh (IsMeshFormat) or the points of any other format. Skips points that are not finite.
 // INVALID_ARGUMENT names the file and the position.
 absl::StatusOr<FileShape> ReadShape(const std::string& path);
+
+// Sets the vertices and triangles of a shape.
+void SetMesh(const TriangleMesh& mesh, FileShape* shape);
 
 // Returns the name of a file without its folders. Bytes that are not UTF-8 become question marks,
 // as they would end the connection to the page.

@@ -139,7 +139,7 @@ TEST(SceneFile, ASceneIsReadOnlyToItsEnd) {
   const TempFile file("poses", "\n{\"placements\":\n[]}\n{\"refreshHulls\":true}\n");
   const auto source = ByteSource::Open(file.path());
   ASSERT_TRUE(ReadScene(source->get()).ok());
-  EXPECT_THAT(std::string(RefuseUpdates(source->get(), "batch").message()),
+  EXPECT_THAT(std::string(ReadWholeScene(file.path(), "batch").status().message()),
               HasSubstr(":4: 'hullctl batch' does not accept updates after the scene"));
 }
 
