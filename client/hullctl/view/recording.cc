@@ -57,9 +57,10 @@ absl::StatusOr<std::string> AllPairs(const Client& client, const std::vector<Vie
   for (uint32_t a = 0; a < objects.size(); ++a) {
     for (uint32_t b = a + 1; b < objects.size(); ++b) {
       if (objects[a].hull_id.empty() || objects[b].hull_id.empty()) continue;
-      HULLD_ASSIGN_OR_RETURN(const auto response, Proven(client, [&](bool certificate) {
-                               return PairRequest(objects[a], objects[b], certificate);
-                             }));
+      const auto request_with = [&](bool certificate) {
+        return PairRequest(objects[a], objects[b], certificate);
+      };
+      HULLD_ASSIGN_OR_RETURN(const auto response, Proven(client, request_with));
       absl::StrAppend(&answers, answers.size() > 1 ? "," : "",
                       PairAnswerJson({a, b}, objects[a], objects[b], 0, response));
     }
