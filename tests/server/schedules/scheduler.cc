@@ -89,7 +89,7 @@ std::optional<ScheduleFault> Scheduler::Run(std::function<void()> body) {
       Record("ends", nullptr, {});
       Unblock(fiber);
       IdleFibers().push_back(fiber);
-      next_ = Choose().value_or(kNobody);
+      next_ = Choose();
     }
     if (fault_.has_value()) return fault_;
   }
@@ -131,13 +131,14 @@ void Scheduler::GoOn() {
   }
   ++now_;
   const size_t self = running_;
-  next_ = Choose().value_or(kNobody);
+  next_ = Choose();
   if (next_ != self) Suspend();
 }
 
-std::optional<size_t> Scheduler::Choose() {
+// Returns kNobody if no thread can run.
+size_t Scheduler::Choose() {
   if (timeouts_ > 0 || spurious_ > 0) MayWakeOne();
-  if (ready_.empty()) return std::nullopt;
+  if (ready_.empty()) return kNobody;
   if (by_priority_) {
     for (; !change_points_.empty() && steps_.size() > change_points_.back();
          change_points_.pop_back()) {

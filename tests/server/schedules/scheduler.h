@@ -137,7 +137,7 @@ class Scheduler {
 
   void Record(const char* what, const void* object, const Location& where);
   void GoOn();
-  std::optional<size_t> Choose();
+  size_t Choose();
   void MayWakeOne();
   void SetStatus(size_t thread, Status status);
   void Suspend();
