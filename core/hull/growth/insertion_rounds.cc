@@ -119,7 +119,7 @@ class RoundsInsertion {
     // If most points of a round are outside, so are most of the next, even if the surface is new.
     if (surface_.IsMapWorthwhile()) {
       surface_.MeasureBefore(vertices_, is_last ? points_.size() : members_.size(),
-                             kRoundMapFineness, kRoundWalksPerPoint, poll_);
+                             kRoundMapFineness, kRoundWalksPerPoint, poll_, nullptr);
     }
     const DirectionMap* directions = surface_.directions();
     if (is_last) ChooseLast(round, directions);

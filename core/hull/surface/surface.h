@@ -15,6 +15,7 @@
 #include "core/hull/surface/chunked_vector.h"
 #include "core/hull/surface/direction_map.h"
 #include "core/hull/surface/kept_before.h"
+#include "core/hull/surface/triangle_cones.h"
 #include "core/hull/surface/vertex_table.h"
 #include "core/numeric/exponent_limits.h"
 #include "core/numeric/vector.h"
@@ -85,17 +86,20 @@ class Surface {
   }
 
   // The location of a point, and a triangle that it sees strictly (outside) or with a cone that
-  // contains it (inside). Unknown: no triangle was found.
-  enum class Side { kInside, kOutside, kUnknown };
+  // contains it (inside). Below: inside, and strictly below the triangle's plane, so that the point
+  // equals no vertex. Unknown: no triangle was found.
+  enum class Side { kInside, kBelow, kOutside, kUnknown };
   struct Location {
     Side side;
     TriangleId triangle;
   };
-  // Locates a point; fast if the last point located in the same cell of the map was near it.
-  // Unknown if the walk exceeds the length expected for the surface. Requires: a known interior
+  // Locates a point; fast if the last point located with these cones, or in the same cell of the
+  // map, was near it. Unknown if the walk exceeds the length expected for the surface. cones: of
+  // the present surface; may be null, and then no location is kBelow. Requires: a known interior
   // point.
-  Location Locate(const VertexTable& vertices, const Vector& point) {
+  Location Locate(const VertexTable& vertices, const Vector& point, TriangleCones* cones) {
     HULLD_CHECK(directions_.has_value());
+    if (cones != nullptr) return LocateByCones(vertices, point, *cones);
     const size_t cell = directions_->PlaceOf(point).cell;
     const double size = SizeWith(vertices, point);
     const TriangleId start = Alive(directions_->hint(cell));
@@ -161,9 +165,10 @@ class Surface {
   // fit its present shape. fineness: the map has at most this many times as many cells per side as
   // a map for single points. Returns true if it remeasured; false also if no interior point is
   // known or the poll stopped, with walks as its steps. Cost: at most `walks_per_point` walks for
-  // each point.
+  // each point. cones: may be null; walks are faster with them if the map has many more corners
+  // than the surface has triangles.
   bool MeasureBefore(const VertexTable& vertices, size_t points, double fineness,
-                     double walks_per_point, StopPoll& poll);
+                     double walks_per_point, StopPoll& poll, TriangleCones* cones);
   // False if the map rejected too few of the points looked up since the last measurement.
   bool IsMapWorthwhile() const { return 8 * rejected_ >= asked_; }
   // Records the number of points looked up in the map and rejected by it, as a measure of its
@@ -288,6 +293,10 @@ class Surface {
   }
   Location Walk(const VertexTable& vertices, const Vector& point, double size, TriangleId start,
                 uint64_t& steps) const;
+  TriangleCones::Cone ConeOf(const VertexTable& vertices, TriangleId id) const;
+  Location LocateByCones(const VertexTable& vertices, const Vector& point, TriangleCones& cones);
+  Location WalkByCones(const VertexTable& vertices, const Vector& point, double size,
+                       TriangleId start, TriangleCones& cones);
   Ray RayTo(const Vector& point) const;
   size_t EdgeToward(const VertexTable& vertices, const SurfaceTriangle& t, const Vector& point,
                     const Ray& ray, std::optional<uint32_t> first) const;
@@ -298,10 +307,11 @@ class Surface {
   bool IsWorthMeasuring() const;
   void SetCenter(const VertexTable& vertices);
   void StartMeasuring(int resolution);
-  void ContinueMeasuring(const VertexTable& vertices, size_t corners);
-  void MeasureCorner(const VertexTable& vertices);
+  void ContinueMeasuring(const VertexTable& vertices, size_t corners, TriangleCones* cones);
+  void MeasureCorner(const VertexTable& vertices, TriangleCones* cones);
   std::optional<Vector> FindInterior(const VertexTable& vertices) const;
-  double Reach(const VertexTable& vertices, const Vector& direction, TriangleId& near);
+  double Reach(const VertexTable& vertices, const Vector& direction, TriangleId& near,
+               TriangleCones* cones);
 
   bool CollectCertainRegion(TriangleId first, const Vector& point, double size);
   void CollectRegion(const VertexTable& vertices, TriangleId first, const Vector& point,

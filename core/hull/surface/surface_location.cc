@@ -86,6 +86,65 @@ double Surface::MinTurn(const VertexTable& vertices, TriangleId id, const Vector
                   std::min(direction.dot(b.cross(c)), direction.dot(c.cross(a))));
 }
 
+TriangleCones::Cone Surface::ConeOf(const VertexTable& vertices, TriangleId id) const {
+  const SurfaceTriangle& t = triangles_[id];
+  const Vector& center = directions_->center();
+  const Vector a = vertices[t.corners[0]] - center;
+  const Vector b = vertices[t.corners[1]] - center;
+  const Vector c = vertices[t.corners[2]] - center;
+  return {t.normal, t.offset, t.slope, t.neighbors, {Cross(a, b), Cross(b, c), Cross(c, a)}};
+}
+
+// Walk with values from cones. They are computed like those of SideOf and EdgeToward, so they have
+// the same error bounds. A triangle's plane is tested exactly only if the cone contains the point.
+Surface::Location Surface::WalkByCones(const VertexTable& vertices, const Vector& point,
+                                       double size, TriangleId start, TriangleCones& cones) {
+  const Ray ray = RayTo(point);
+  TriangleId at = start;
+  for (size_t step = 0; step < kStepsBeforeChance; ++step) {
+    ++work_;
+    const TriangleCones::Cone& cone =
+        cones.Get(at, [&](TriangleId id) { return ConeOf(vertices, id); });
+    const double height = Dot(cone.normal, point) - cone.offset;
+    const double bound = static_cast<double>(cone.slope) * size;
+    if (height > bound) return SeenNear(at, point, size);
+    const std::array<double, 3> turns = cone.TurnsTo(ray.y);
+    const double least = std::min(turns[0], std::min(turns[1], turns[2]));
+    if (least > ray.bound) {
+      if (height < -bound) return {Side::kBelow, at};
+      const bool is_outside = ExactSideOf(vertices, triangles_[at], point) > 0;
+      return {is_outside ? Side::kOutside : Side::kInside, at};
+    }
+    if (!(least < -ray.bound)) break;
+    at = cone.neighbors[least == turns[0] ? 0 : least == turns[1] ? 1 : 2];
+  }
+  return Walk(vertices, point, size, at, work_);
+}
+
+Surface::Location Surface::LocateByCones(const VertexTable& vertices, const Vector& point,
+                                         TriangleCones& cones) {
+  const double size = SizeWith(vertices, point);
+  // Consecutive points are often close to each other.
+  const TriangleCones::Cone* const near = cones.near();
+  if (near != nullptr) {
+    const Ray ray = RayTo(point);
+    const std::array<double, 3> turns = near->TurnsTo(ray.y);
+    const double least = std::min(turns[0], std::min(turns[1], turns[2]));
+    const double height = Dot(near->normal, point) - near->offset;
+    const bool is_below = height < -static_cast<double>(near->slope) * size;
+    if (is_below & (least > ray.bound)) return {Side::kBelow, cones.near_triangle()};
+  }
+  const size_t cell = directions_->PlaceOf(point).cell;
+  const TriangleId start = Alive(directions_->hint(cell));
+  ++work_;
+  Location location = {Side::kUnknown, start};
+  if (near == nullptr) location = SeenNear(start, point, size);
+  if (location.side == Side::kUnknown) location = WalkByCones(vertices, point, size, start, cones);
+  if (location.side != Side::kUnknown) directions_->SetHint(cell, location.triangle);
+  cones.SetNear(location.side == Side::kBelow ? location.triangle : TriangleCones::kNone);
+  return location;
+}
+
 // Crosses edges that have the point on their far side. The ray from the interior point through the
 // point meets the plane of the next triangle no later, and sooner unless both are coplanar. A walk
 // can therefore cycle only among coplanar triangles, and leaves the cycle when it starts to choose
@@ -132,7 +191,7 @@ Surface::Location Surface::Scan(const VertexTable& vertices, const Vector& point
 }
 
 void Surface::Measure(const VertexTable& vertices) {
-  if (measuring_) ContinueMeasuring(vertices, kCornersPerInsertion);
+  if (measuring_) ContinueMeasuring(vertices, kCornersPerInsertion, nullptr);
   if (alive_ >= next_update_) Update(vertices);
 }
 
@@ -189,7 +248,7 @@ std::optional<Vector> Surface::FindInterior(const VertexTable& vertices) const {
 bool Surface::IsWorthMeasuring() const { return alive_ >= kWorthMeasuring && IsMeasurable(); }
 
 bool Surface::MeasureBefore(const VertexTable& vertices, size_t points, double fineness,
-                            double walks_per_point, StopPoll& poll) {
+                            double walks_per_point, StopPoll& poll, TriangleCones* cones) {
   if (!directions_ || !IsWorthMeasuring()) return false;
   // Six faces, and about two walks to measure a corner.
   const double affordable = std::sqrt(static_cast<double>(points) * walks_per_point / 12);
@@ -206,10 +265,13 @@ bool Surface::MeasureBefore(const VertexTable& vertices, size_t points, double f
   }
   const bool is_cheap =
       2 * static_cast<double>(triangles_.size()) <= walks_per_point * static_cast<double>(points);
-  if (directions_->resolution() == 1 || (is_new && is_cheap)) SetCenter(vertices);
+  if (directions_->resolution() == 1 || (is_new && is_cheap)) {
+    SetCenter(vertices);
+    if (cones != nullptr) cones->Clear();
+  }
   StartMeasuring(wanted);
   while (measuring_ && !poll.Step(kCornersPerInsertion)) {
-    ContinueMeasuring(vertices, kCornersPerInsertion);
+    ContinueMeasuring(vertices, kCornersPerInsertion, cones);
   }
   return !measuring_;
 }
@@ -225,8 +287,8 @@ void Surface::StartMeasuring(int resolution) {
                            std::vector<TriangleId>(row, Alive(last_))};
 }
 
-void Surface::ContinueMeasuring(const VertexTable& vertices, size_t corners) {
-  for (; corners > 0 && measuring_->face < 6; --corners) MeasureCorner(vertices);
+void Surface::ContinueMeasuring(const VertexTable& vertices, size_t corners, TriangleCones* cones) {
+  for (; corners > 0 && measuring_->face < 6; --corners) MeasureCorner(vertices, cones);
   if (measuring_->face < 6) return;
   measuring_->map.Finish(measuring_->least, measuring_->largest, extent_);
   KeepDirections();
@@ -235,7 +297,7 @@ void Surface::ContinueMeasuring(const VertexTable& vertices, size_t corners) {
 }
 
 // Measures one corner, and creates the cell that it completes.
-void Surface::MeasureCorner(const VertexTable& vertices) {
+void Surface::MeasureCorner(const VertexTable& vertices, TriangleCones* cones) {
   Measurement& m = *measuring_;
   const auto j = static_cast<size_t>(m.j);
   const TriangleId hint_above = m.hint[j];
@@ -247,7 +309,7 @@ void Surface::MeasureCorner(const VertexTable& vertices) {
     const TriangleId above = Alive(hint_above);
     if (MinTurn(vertices, above, direction) > MinTurn(vertices, near, direction)) near = above;
   }
-  const double reach = Reach(vertices, direction, near);
+  const double reach = Reach(vertices, direction, near, cones);
   m.map.AppendCorner(reach);
   m.hint[j] = near;
   m.least = std::min(m.least, reach);
@@ -265,7 +327,8 @@ void Surface::MeasureCorner(const VertexTable& vertices) {
 // Returns a distance m, nearly maximal, such that the double nearest to center + m * direction is
 // inside; 0 if none was found. `near`: the start of the walk; receives the triangle at which the
 // direction leaves the surface.
-double Surface::Reach(const VertexTable& vertices, const Vector& direction, TriangleId& near) {
+double Surface::Reach(const VertexTable& vertices, const Vector& direction, TriangleId& near,
+                      TriangleCones* cones) {
   const Vector center = directions_->center();
   double m = extent_ / LargestComponent(direction);
   // A walk to a point outside may end at any triangle that the point sees, so several rounds are
@@ -280,10 +343,12 @@ double Surface::Reach(const VertexTable& vertices, const Vector& direction, Tria
     m *= 1 - step_back;
     if (round % 2 == 1) step_back *= 2;
     const Vector point = center + m * direction;
-    const Location location = Walk(vertices, point, SizeWith(vertices, point), near, work_);
+    const double size = SizeWith(vertices, point);
+    const Location location = cones == nullptr ? Walk(vertices, point, size, near, work_)
+                                               : WalkByCones(vertices, point, size, near, *cones);
     if (location.side == Side::kUnknown) return 0;
     near = location.triangle;
-    if (location.side == Side::kInside) return m;
+    if (location.side != Side::kOutside) return m;
   }
   return 0;
 }
