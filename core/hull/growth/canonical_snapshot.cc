@@ -16,14 +16,16 @@ namespace {
 
 // A vertex being sorted into canonical order.
 struct Ranked {
-  Vector point;
+  double x;
   VertexId id;
 };
 
-void Sort(std::span<Ranked> vertices) {
-  std::sort(vertices.begin(), vertices.end(), [](const Ranked& a, const Ranked& b) {
-    return std::lexicographical_compare(a.point.begin(), a.point.end(), b.point.begin(),
-                                        b.point.end());
+void Sort(const VertexTable& vertices, std::span<Ranked> ranked) {
+  std::sort(ranked.begin(), ranked.end(), [&vertices](const Ranked& a, const Ranked& b) {
+    if (a.x != b.x) return a.x < b.x;
+    const Vector& p = vertices[a.id];
+    const Vector& q = vertices[b.id];
+    return p.y() != q.y() ? p.y() < q.y() : p.z() < q.z();
   });
 }
 
@@ -32,24 +34,25 @@ void Sort(std::span<Ranked> vertices) {
 // The x coordinates of most hulls are spread out. With as many slices across x as vertices, each
 // slice has few vertices, and comparisons are needed only within a slice. The slice of an x is a
 // composition of rounded monotonic operations, so slices are in order for any rounding.
-std::vector<Ranked> SortedByPoint(std::vector<Ranked> vertices, StopPoll& poll) {
+std::vector<Ranked> SortedByPoint(const VertexTable& table, std::vector<Ranked> vertices,
+                                  StopPoll& poll) {
   // A range with a length that overflows or is zero is not sliced.
   double least = INFINITY;
   double largest = -INFINITY;
   for (const Ranked& v : vertices) {
     if (poll.Step()) return vertices;
-    least = std::min(least, v.point.x());
-    largest = std::max(largest, v.point.x());
+    least = std::min(least, v.x);
+    largest = std::max(largest, v.x);
   }
   const double scale = static_cast<double>(vertices.size()) / (largest - least);
   constexpr size_t kWorthSlicing = 32;
   if (vertices.size() < kWorthSlicing || !(scale > 0 && scale <= kLargestDouble)) {
-    Sort(vertices);
+    Sort(table, vertices);
     return vertices;
   }
   const auto last = static_cast<double>(vertices.size() - 1);
   const auto slice_of = [&](const Ranked& v) {
-    return static_cast<size_t>(std::min((v.point.x() - least) * scale, last));
+    return static_cast<size_t>(std::min((v.x - least) * scale, last));
   };
   // ends[s]: the start of slice s, which advances to its end as the slice fills.
   std::vector<uint32_t> ends(vertices.size(), 0);
@@ -67,7 +70,7 @@ std::vector<Ranked> SortedByPoint(std::vector<Ranked> vertices, StopPoll& poll) 
   uint32_t first = 0;
   for (const uint32_t end : ends) {
     if (poll.Step()) break;
-    if (end - first > 1) Sort(std::span(sorted).subspan(first, end - first));
+    if (end - first > 1) Sort(table, std::span(sorted).subspan(first, end - first));
     first = end;
   }
   return sorted;
@@ -85,9 +88,9 @@ Ranking Rank(const VertexTable& vertices, StopPoll& poll) {
   ranked.reserve(vertices.size());
   for (VertexId id = 0; id < vertices.id_bound(); ++id) {
     if (poll.Step()) return {};
-    if (vertices.IsAlive(id)) ranked.push_back({vertices[id], id});
+    if (vertices.IsAlive(id)) ranked.push_back({vertices[id].x(), id});
   }
-  ranked = SortedByPoint(std::move(ranked), poll);
+  ranked = SortedByPoint(vertices, std::move(ranked), poll);
   if (poll.stopped()) return {};
   Ranking ranking;
   ranking.points.reserve(ranked.size());
@@ -95,7 +98,7 @@ Ranking Rank(const VertexTable& vertices, StopPoll& poll) {
   for (const Ranked& v : ranked) {
     if (poll.Step()) return {};
     ranking.index_of[v.id] = static_cast<uint32_t>(ranking.points.size());
-    ranking.points.push_back(v.point);
+    ranking.points.push_back(vertices[v.id]);
   }
   return ranking;
 }
@@ -143,7 +146,7 @@ class FaceCollector {
     // Reserves exactly, because a snapshot is long-lived and never grows.
     faces.facet_starts.reserve(triangle_facets_ + polygon_starts_.size());
     faces.facet_vertices.reserve(3 * triangle_facets_ + polygon_vertices_.size());
-    faces.edges.reserve(departures_.size());
+    faces.edges.reserve(departures_.size() - 1);
     faces.facet_starts.push_back(0);
     const auto vertex_count = static_cast<uint32_t>(ranking_.points.size());
     uint32_t first = 0;
@@ -174,6 +177,8 @@ class FaceCollector {
   // has been found.
   static constexpr uint8_t kAnyFlat = 7;
   static constexpr uint8_t kVisited = 8;
+  // Triangles between the request of a neighbor and its use.
+  static constexpr size_t kAhead = 16;
 
   // An edge from its lower vertex to its higher one.
   struct Departure {
@@ -196,8 +201,17 @@ class FaceCollector {
   // Edges at which triangles were joined record if they are flat. Triangles created together share
   // an apex; for each, tests the edge to the next one around the apex.
   void FindFlatEdges(StopPoll& poll) {
+    const auto neighbor = [this](size_t id) -> const SurfaceTriangle& {
+      return surface_.triangle(surface_.triangle(static_cast<TriangleId>(id)).neighbors[1]);
+    };
     surface_.ForEachTriangle([&](TriangleId id, const SurfaceTriangle& t) {
       if (poll.Step()) return;
+      // Neighbors and their vertices are anywhere in memory, so both are requested ahead of their
+      // use. Not in a function: compilers drop calls without effect.
+      if (const size_t ahead = id + kAhead; ahead < surface_.id_bound()) {
+        __builtin_prefetch(&neighbor(ahead));
+        __builtin_prefetch(&vertices_[neighbor(ahead - kAhead / 2).corners[1]]);
+      }
       flags_[id] |= t.flat;
       const TriangleId next = t.neighbors[1];
       const SurfaceTriangle& other = surface_.triangle(next);
@@ -252,13 +266,15 @@ class FaceCollector {
   }
 
   // Calls visit(tail, head, next) for every edge of a triangular facet, and of a polygon, that
-  // leads from a lower vertex to a higher one.
+  // leads from a lower vertex to a higher one. For the other edges of a triangle, the tail is the
+  // number of vertices: a branch would be unpredictable.
   template <typename Visitor>
   void ForEachTriangleDeparture(const SurfaceTriangle& t, Visitor&& visit) const {
     const auto [a, b, c] = RanksOf(t);
-    if (a < b) visit(a, b, c);
-    if (b < c) visit(b, c, a);
-    if (c < a) visit(c, a, b);
+    const auto none = static_cast<uint32_t>(ranking_.points.size());
+    visit(a < b ? a : none, b, c);
+    visit(b < c ? b : none, c, a);
+    visit(c < a ? c : none, a, b);
   }
   template <typename Visitor>
   void ForEachPolygonDeparture(size_t k, Visitor&& visit) const {
@@ -279,14 +295,18 @@ class FaceCollector {
     });
     for (size_t k = 0; k + 1 < polygon_starts_.size(); ++k) ForEachPolygonDeparture(k, count);
     uint32_t begin = 0;
+    // The last entry counts the edges that are no departures; these share one place.
+    departures_at_.back() = 0;
     for (uint32_t& at : departures_at_) begin += std::exchange(at, begin);
-    departures_.resize(begin);
+    departures_.resize(begin + 1);
   }
 
   // Advances departures_at_[v] to the end of the departures at vertex v.
   void WriteDepartures(StopPoll& poll) {
-    const auto write = [this](uint32_t tail, uint32_t head, uint32_t next) {
-      departures_[departures_at_[tail]++] = {head, next};
+    const auto none = static_cast<uint32_t>(ranking_.points.size());
+    const auto write = [this, none](uint32_t tail, uint32_t head, uint32_t next) {
+      departures_[departures_at_[tail]] = {head, next};
+      departures_at_[tail] += tail != none;
     };
     surface_.ForEachTriangle([&](TriangleId id, const SurfaceTriangle& t) {
       if (poll.Step() || (flags_[id] & kAnyFlat) != 0) return;
