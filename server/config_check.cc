@@ -12,7 +12,7 @@
 #include "server/access/secret_file.h"
 #include "server/access/tls_identity.h"
 #include "server/access/token_table.h"
-#include "server/contract/status_map.h"
+#include "server/contract/errors.h"
 #include "server/process/listen_address.h"
 #include "server/process/metrics_endpoint.h"
 #include "server/store/postgres/session.h"

@@ -1,12 +1,10 @@
 #include "server/server.h"
 
 #include <absl/status/status.h>
-#include <absl/strings/str_cat.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <chrono>
-#include <iterator>
 #include <limits>
 #include <map>
 #include <memory>
@@ -15,10 +13,19 @@
 #include <utility>
 
 #include "core/base/status_macros.h"
+#include "grpc/reflection/v1alpha/reflection.grpc.pb.h"
+#include "hulld/v1/body.grpc.pb.h"
+#include "hulld/v1/collision.grpc.pb.h"
+#include "hulld/v1/hull.grpc.pb.h"
+#include "hulld/v1/maintenance.grpc.pb.h"
+#include "hulld/v1/status.grpc.pb.h"
 #include "server/access/secret_file.h"
+#include "server/admin/admin_services.h"
+#include "server/bodies/body_service.h"
 #include "server/call/transport.h"
+#include "server/collisions/collision_service.h"
 #include "server/config_check.h"
-#include "server/contract/status_map.h"
+#include "server/hulls/hull_service.h"
 #include "server/network/guarded_sockets.h"
 #include "server/process/descriptors.h"
 #include "server/process/listen_address.h"
@@ -30,19 +37,17 @@
 namespace hulld::server {
 namespace {
 
-constexpr const char* kServices[] = {
-    v1::HullService::service_full_name(), v1::BodyService::service_full_name(),
-    v1::CollisionService::service_full_name(), v1::StatusService::service_full_name(),
-    v1::MaintenanceService::service_full_name()};
+// Names of the services of hulld, without those of gRPC's own protocols.
+std::vector<std::string> OwnServices() {
+  return {v1::HullService::service_full_name(), v1::BodyService::service_full_name(),
+          v1::CollisionService::service_full_name(), v1::StatusService::service_full_name(),
+          v1::MaintenanceService::service_full_name()};
+}
 
-std::vector<std::string> OwnServices() { return {std::begin(kServices), std::end(kServices)}; }
-
-// Includes services of gRPC's own protocols.
 std::vector<std::string> AllServices() {
-  std::vector<std::string> names = {
-      grpc::health::v1::Health::service_full_name(),
-      grpc::reflection::v1alpha::ServerReflection::service_full_name()};
-  names.insert(names.begin(), std::begin(kServices), std::end(kServices));
+  std::vector<std::string> names = OwnServices();
+  names.emplace_back(grpc::health::v1::Health::service_full_name());
+  names.emplace_back(grpc::reflection::v1alpha::ServerReflection::service_full_name());
   return names;
 }
 
@@ -184,13 +189,13 @@ Server::Server(const Config& config, std::unique_ptr<Guard> guard, std::unique_p
       long_readers_(PoolThreads(), metrics_.AddPool("long_readers")),
       pool_(AnswerThreads(config), metrics_.AddPool("single_calls"), metrics_.AddPool("slices")),
       parts_{*store_, registry_, admission_, writers_, readers_, long_readers_, pool_, waiting_},
-      hull_service_(parts_),
-      body_service_(parts_),
-      collision_service_(parts_),
-      status_service_(parts_),
-      maintenance_service_(parts_),
-      health_service_(admission_, OwnServices()),
-      reflection_service_(admission_, AllServices()) {
+      health_service_(admission_, OwnServices()) {
+  services_.push_back(MakeHullService(parts_));
+  services_.push_back(MakeBodyService(parts_));
+  services_.push_back(MakeCollisionService(parts_));
+  services_.push_back(MakeStatusService(parts_));
+  services_.push_back(MakeMaintenanceService(parts_));
+  services_.push_back(MakeReflectionService(admission_, AllServices()));
   admission_.SetBacklog([this](Rpc rpc) {
     if (UsesWriters(rpc)) return writers_.waiting();
     return readers_.waiting() + long_readers_.waiting() + pool_.waiting() + waiting_.count();
@@ -243,13 +248,8 @@ absl::Status Server::Listen(const Config& config) {
       grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD,
       guard_->credentials());
   SetTransport(config, builder);
-  builder.RegisterService(&hull_service_);
-  builder.RegisterService(&body_service_);
-  builder.RegisterService(&collision_service_);
-  builder.RegisterService(&status_service_);
-  builder.RegisterService(&maintenance_service_);
   builder.RegisterService(&health_service_);
-  builder.RegisterService(&reflection_service_);
+  for (const auto& service : services_) builder.RegisterService(service.get());
   grpc_server_ = builder.BuildAndStart();
   if (grpc_server_ == nullptr) return absl::InternalError("gRPC failed to start the server");
   address_ = address->Format(acceptor_->port());

@@ -13,13 +13,8 @@
 
 #include "server/access/guard.h"
 #include "server/admin/health_service.h"
-#include "server/admin/maintenance_service.h"
-#include "server/admin/reflection_service.h"
-#include "server/admin/status_service.h"
-#include "server/bodies/body_service.h"
 #include "server/call/admission.h"
-#include "server/collisions/collision_service.h"
-#include "server/hulls/hull_service.h"
+#include "server/call/service_parts.h"
 #include "server/network/connection_acceptor.h"
 #include "server/network/connection_table.h"
 #include "server/process/metrics.h"
@@ -102,13 +97,9 @@ class Server {
   // Calls that wait for the store without occupying a thread.
   WaitingCalls waiting_;
   const ServiceParts parts_;
-  HullService hull_service_;
-  BodyService body_service_;
-  CollisionService collision_service_;
-  StatusService status_service_;
-  MaintenanceService maintenance_service_;
   HealthService health_service_;
-  ReflectionService reflection_service_;
+  // All other services.
+  std::vector<std::unique_ptr<grpc::Service>> services_;
   std::string address_;
   std::unique_ptr<ConnectionAcceptor> acceptor_;
   std::unique_ptr<grpc::Server> grpc_server_;

@@ -4,7 +4,7 @@
 #include <absl/strings/str_cat.h>
 
 #include "core/base/status_macros.h"
-#include "server/contract/error_info.h"
+#include "server/contract/errors.h"
 #include "server/contract/hull_id.h"
 #include "server/contract/rpc.h"
 #include "server/settings/config.h"

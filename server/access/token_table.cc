@@ -12,8 +12,8 @@
 
 #include "core/base/status_macros.h"
 #include "server/access/secret_file.h"
+#include "server/contract/errors.h"
 #include "server/contract/hull_id.h"
-#include "server/contract/status_map.h"
 
 namespace hulld::server {
 namespace {

@@ -9,8 +9,7 @@
 #include "server/call/message_bytes.h"
 #include "server/call/queued_stream.h"
 #include "server/call/request_memory.h"
-#include "server/contract/error_info.h"
-#include "server/contract/status_map.h"
+#include "server/contract/errors.h"
 
 namespace hulld::server {
 namespace {

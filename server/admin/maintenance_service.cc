@@ -1,5 +1,3 @@
-#include "server/admin/maintenance_service.h"
-
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 #include <absl/strings/str_cat.h>
@@ -16,8 +14,10 @@
 #include <vector>
 
 #include "core/base/status_macros.h"
+#include "hulld/v1/maintenance.grpc.pb.h"
+#include "server/admin/admin_services.h"
 #include "server/call/pulled_stream.h"
-#include "server/contract/error_info.h"
+#include "server/contract/errors.h"
 #include "server/settings/config.h"
 #include "server/store/store_keys.h"
 #include "server/wire/encode.h"
@@ -138,10 +138,23 @@ class BackupStream : public RequestStream<PulledStream<WriteReactor, v1::SaveBac
   bool ended_ = false;
 };
 
+class MaintenanceService : public v1::MaintenanceService::WithRawCallbackMethod_SaveBackup<
+                               v1::MaintenanceService::Service> {
+ public:
+  explicit MaintenanceService(const ServiceParts& parts) : parts_(parts) {}
+
+  WriteReactor* SaveBackup(CallContext* context, const Bytes* request) override {
+    return BackupStream::Launch(std::make_shared<BackupStream>(*context, parts_, *request));
+  }
+
+ private:
+  const ServiceParts& parts_;
+};
+
 }  // namespace
 
-WriteReactor* MaintenanceService::SaveBackup(CallContext* context, const Bytes* request) {
-  return BackupStream::Launch(std::make_shared<BackupStream>(*context, parts_, *request));
+std::unique_ptr<grpc::Service> MakeMaintenanceService(const ServiceParts& parts) {
+  return std::make_unique<MaintenanceService>(parts);
 }
 
 }  // namespace hulld::server

@@ -1,5 +1,3 @@
-#include "server/admin/reflection_service.h"
-
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
 #include <google/protobuf/descriptor.h>
@@ -9,6 +7,8 @@
 #include <set>
 #include <utility>
 
+#include "grpc/reflection/v1alpha/reflection.grpc.pb.h"
+#include "server/admin/admin_services.h"
 #include "server/call/pulled_stream.h"
 
 namespace hulld::server {
@@ -106,11 +106,31 @@ class ReflectionStream
   const std::vector<std::string>& services_;
 };
 
+// The generated service, with its method on bytes (message_bytes.h).
+using ReflectionServiceOfBytes =
+    grpc::reflection::v1alpha::ServerReflection::WithRawCallbackMethod_ServerReflectionInfo<
+        grpc::reflection::v1alpha::ServerReflection::Service>;
+
+class ReflectionService : public ReflectionServiceOfBytes {
+ public:
+  ReflectionService(Admission& admission, std::vector<std::string> services)
+      : admission_(admission), services_(std::move(services)) {}
+
+  BidiReactor* ServerReflectionInfo(CallContext* context) override {
+    return ReflectionStream::Launch(
+        std::make_shared<ReflectionStream>(*context, admission_, services_));
+  }
+
+ private:
+  Admission& admission_;
+  const std::vector<std::string> services_;
+};
+
 }  // namespace
 
-BidiReactor* ReflectionService::ServerReflectionInfo(CallContext* context) {
-  return ReflectionStream::Launch(
-      std::make_shared<ReflectionStream>(*context, admission_, services_));
+std::unique_ptr<grpc::Service> MakeReflectionService(Admission& admission,
+                                                     std::vector<std::string> services) {
+  return std::make_unique<ReflectionService>(admission, std::move(services));
 }
 
 }  // namespace hulld::server

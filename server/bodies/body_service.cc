@@ -7,9 +7,11 @@
 #include <utility>
 
 #include "core/base/status_macros.h"
+#include "hulld/v1/body.grpc.pb.h"
 #include "server/access/caller.h"
-#include "server/contract/limit_error.h"
-#include "server/contract/status_map.h"
+#include "server/call/call.h"
+#include "server/call/unary_call.h"
+#include "server/contract/errors.h"
 #include "server/registry/body_resolution.h"
 #include "server/registry/catalog/body.h"
 #include "server/wire/decode.h"
@@ -87,86 +89,107 @@ void EncodePose(const Pose& pose, v1::Pose* message) {
   EncodeVector(pose.t, message->mutable_translation());
 }
 
+// The generated service, with methods that exchange bytes (message_bytes.h).
+using BodyServiceOfBytes =
+    v1::BodyService::WithRawCallbackMethod_PutBody<v1::BodyService::WithRawCallbackMethod_GetBody<
+        v1::BodyService::WithRawCallbackMethod_ListBodies<
+            v1::BodyService::WithRawCallbackMethod_DeleteBody<v1::BodyService::Service>>>>;
+
+class BodyService : public BodyServiceOfBytes {
+ public:
+  explicit BodyService(const ServiceParts& parts) : parts_(parts) {}
+
+  UnaryReactor* PutBody(CallContext* context, const Bytes* request, Bytes* response) override {
+    return PutCall::Start(
+        context, parts_.admission, Rpc::kPutBody, request, response, [this](PutCall* call) {
+          parts_.readers.Submit([this, call] { Put(call); }, call->call().client());
+        });
+  }
+
+  UnaryReactor* GetBody(CallContext* context, const Bytes* request, Bytes* response) override {
+    return UnaryCall<v1::GetBodyRequest, v1::GetBodyResponse>::Start(
+        context, parts_.admission, Rpc::kGetBody, request, response, [this](auto* call) {
+          const auto get = [this, call](std::chrono::nanoseconds staleness) {
+            return Get(call->request(), call->call(), staleness, &call->response());
+          };
+          EndFresh(parts_.registry, parts_.readers, call, get, false);
+        });
+  }
+
+  UnaryReactor* ListBodies(CallContext* context, const Bytes* request, Bytes* response) override {
+    return UnaryCall<v1::ListBodiesRequest, v1::ListBodiesResponse>::Start(
+        context, parts_.admission, Rpc::kListBodies, request, response, [this](auto* call) {
+          EndListed(parts_.registry, parts_.readers, call, Rpc::kListBodies, {.bodies = true},
+                    AddListed);
+        });
+  }
+
+  UnaryReactor* DeleteBody(CallContext* context, const Bytes* request, Bytes* response) override {
+    return UnaryCall<v1::DeleteBodyRequest, v1::DeleteBodyResponse>::Start(
+        context, parts_.admission, Rpc::kDeleteBody, request, response, [this](auto* call) {
+          EndDeleted(parts_.registry, call, "body", call->request().body_id());
+        });
+  }
+
+ private:
+  using PutCall = UnaryCall<v1::PutBodyRequest, v1::PutBodyResponse>;
+
+  // Ends the call after the change is committed.
+  void Put(PutCall* call) {
+    if (call->call().ShouldStop()) return call->End(call->call().StopStatus());
+    absl::StatusOr<StoredBody> body = DecodeBody(call->request(), call->call().caller(),
+                                                 parts_.registry.limits().max_pieces_per_body);
+    if (!body.ok()) return call->End(body.status());
+    parts_.registry.changes().PutBody(
+        *std::move(body), IfRevision(call->request()),
+        [this, call](const absl::StatusOr<PutBodyResult>& result) {
+          if (!result.ok()) return call->End(result.status());
+          const BodyRecord& record = result->body;
+          call->call().LogChange(result->created ? "body created" : "body replaced",
+                                 {"body", record.body_id}, record.revision);
+          v1::PutBodyResponse& response = call->response();
+          EncodeHeader(parts_.store, result->store_revision, response.mutable_header());
+          v1::BodyInfo* const info = response.mutable_body();
+          info->set_body_id(record.body_id);
+          info->set_create_revision(record.create_revision);
+          info->set_revision(record.revision);
+          info->set_piece_count(result->piece_count);
+          response.set_created(result->created);
+          response.set_durability(EncodeDurability(parts_.store.durability()));
+          call->End(absl::OkStatus());
+        });
+  }
+
+  absl::Status Get(const v1::GetBodyRequest& request, const Call& call,
+                   std::chrono::nanoseconds staleness, v1::GetBodyResponse* response) {
+    const std::string& id = request.body_id();
+    HULLD_RETURN_IF_ERROR(CheckHullId(call.caller(), id, "body_id"));
+    const FoundBodies found = parts_.registry.records().FindBodies(
+        std::span(&id, 1), [&call] { return call.ShouldStop(); });
+    if (!found.status.ok()) return found.status;
+    const std::shared_ptr<const Body>& body = found.bodies.front();
+    if (body == nullptr) return BodyNotFound(id);
+    if (!body->damage().ok()) return body->damage();
+    HULLD_RETURN_IF_ERROR(CheckPiecePrefix(*body, call.caller().prefix));
+    EncodeHeader(parts_.store, AsOf{found.store_revision, staleness}, response->mutable_header());
+    EncodeBody(body->Describe(), response->mutable_body());
+    response->mutable_pieces()->Reserve(static_cast<int>(body->pieces().size()));
+    for (const StoredPiece& piece : body->pieces()) {
+      v1::Placement* const placement = response->add_pieces();
+      placement->set_hull_id(body->hull_ids()[piece.hull]);
+      EncodePose(piece.X_BP, placement->mutable_pose());
+      placement->set_radius(piece.radius);
+    }
+    return absl::OkStatus();
+  }
+
+  const ServiceParts& parts_;
+};
+
 }  // namespace
 
-UnaryReactor* BodyService::PutBody(CallContext* context, const Bytes* request, Bytes* response) {
-  return PutCall::Start(context, parts_.admission, Rpc::kPutBody, request, response,
-                        [this](PutCall* call) {
-                          parts_.readers.Submit([this, call] { Put(call); }, call->call().client());
-                        });
-}
-
-UnaryReactor* BodyService::GetBody(CallContext* context, const Bytes* request, Bytes* response) {
-  return GetCall::Start(context, parts_.admission, Rpc::kGetBody, request, response,
-                        [this](GetCall* call) {
-                          const auto get = [this, call](std::chrono::nanoseconds staleness) {
-                            return Get(call->request(), call->call(), staleness, &call->response());
-                          };
-                          EndFresh(parts_.registry, parts_.readers, call, get, false);
-                        });
-}
-
-UnaryReactor* BodyService::ListBodies(CallContext* context, const Bytes* request, Bytes* response) {
-  return ListCall::Start(context, parts_.admission, Rpc::kListBodies, request, response,
-                         [this](ListCall* call) {
-                           EndListed(parts_.registry, parts_.readers, call, Rpc::kListBodies,
-                                     {.bodies = true}, AddListed);
-                         });
-}
-
-UnaryReactor* BodyService::DeleteBody(CallContext* context, const Bytes* request, Bytes* response) {
-  return DeleteCall::Start(context, parts_.admission, Rpc::kDeleteBody, request, response,
-                           [this](DeleteCall* call) {
-                             EndDeleted(parts_.registry, call, "body", call->request().body_id());
-                           });
-}
-
-void BodyService::Put(PutCall* call) {
-  if (call->call().ShouldStop()) return call->End(call->call().StopStatus());
-  absl::StatusOr<StoredBody> body = DecodeBody(call->request(), call->call().caller(),
-                                               parts_.registry.limits().max_pieces_per_body);
-  if (!body.ok()) return call->End(body.status());
-  parts_.registry.changes().PutBody(
-      *std::move(body), IfRevision(call->request()),
-      [this, call](const absl::StatusOr<PutBodyResult>& result) {
-        if (!result.ok()) return call->End(result.status());
-        const BodyRecord& record = result->body;
-        call->call().LogChange(result->created ? "body created" : "body replaced",
-                               {"body", record.body_id}, record.revision);
-        v1::PutBodyResponse& response = call->response();
-        EncodeHeader(parts_.store, result->store_revision, response.mutable_header());
-        v1::BodyInfo* const info = response.mutable_body();
-        info->set_body_id(record.body_id);
-        info->set_create_revision(record.create_revision);
-        info->set_revision(record.revision);
-        info->set_piece_count(result->piece_count);
-        response.set_created(result->created);
-        response.set_durability(EncodeDurability(parts_.store.durability()));
-        call->End(absl::OkStatus());
-      });
-}
-
-absl::Status BodyService::Get(const v1::GetBodyRequest& request, const Call& call,
-                              std::chrono::nanoseconds staleness, v1::GetBodyResponse* response) {
-  const std::string& id = request.body_id();
-  HULLD_RETURN_IF_ERROR(CheckHullId(call.caller(), id, "body_id"));
-  const FoundBodies found = parts_.registry.records().FindBodies(
-      std::span(&id, 1), [&call] { return call.ShouldStop(); });
-  if (!found.status.ok()) return found.status;
-  const std::shared_ptr<const Body>& body = found.bodies.front();
-  if (body == nullptr) return BodyNotFound(id);
-  if (!body->damage().ok()) return body->damage();
-  HULLD_RETURN_IF_ERROR(CheckPiecePrefix(*body, call.caller().prefix));
-  EncodeHeader(parts_.store, AsOf{found.store_revision, staleness}, response->mutable_header());
-  EncodeBody(body->Describe(), response->mutable_body());
-  response->mutable_pieces()->Reserve(static_cast<int>(body->pieces().size()));
-  for (const StoredPiece& piece : body->pieces()) {
-    v1::Placement* const placement = response->add_pieces();
-    placement->set_hull_id(body->hull_ids()[piece.hull]);
-    EncodePose(piece.X_BP, placement->mutable_pose());
-    placement->set_radius(piece.radius);
-  }
-  return absl::OkStatus();
+std::unique_ptr<grpc::Service> MakeBodyService(const ServiceParts& parts) {
+  return std::make_unique<BodyService>(parts);
 }
 
 }  // namespace hulld::server

@@ -9,8 +9,7 @@
 
 #include "core/base/check.h"
 #include "server/access/guard.h"
-#include "server/contract/error_info.h"
-#include "server/contract/limit_error.h"
+#include "server/contract/errors.h"
 
 namespace hulld::server {
 namespace {

@@ -7,8 +7,7 @@
 #include <atomic>
 #include <chrono>
 
-#include "server/contract/error_info.h"
-#include "server/contract/limit_error.h"
+#include "server/contract/errors.h"
 
 namespace hulld::server {
 

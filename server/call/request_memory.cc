@@ -4,7 +4,7 @@
 
 #include <chrono>
 
-#include "server/contract/limit_error.h"
+#include "server/contract/errors.h"
 
 namespace hulld::server {
 namespace {

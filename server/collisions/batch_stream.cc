@@ -1,7 +1,10 @@
 #include "server/collisions/batch_stream.h"
 
+#include <memory>
+
 #include "core/base/status_macros.h"
 #include "core/query/collision.h"
+#include "server/collisions/collision_calls.h"
 #include "server/collisions/placed/query_settings.h"
 #include "server/wire/answer_columns.h"
 #include "server/wire/decode.h"
@@ -86,6 +89,10 @@ absl::Status BatchStream::AnswerRelation(uint32_t a, uint32_t b, PairsPiece& pie
   piece.rungs.Add(answer->rung);
   EndPair(piece, AddRelation(*answer, piece.rows.mutable_columns()));
   return absl::OkStatus();
+}
+
+WriteReactor* StartBatch(CallContext& context, const ServiceParts& parts, const Bytes& request) {
+  return BatchStream::Launch(std::make_shared<BatchStream>(context, parts, request));
 }
 
 }  // namespace hulld::server

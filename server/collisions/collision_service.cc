@@ -1,35 +1,53 @@
 #include "server/collisions/collision_service.h"
 
-#include <memory>
-
-#include "server/collisions/batch_stream.h"
-#include "server/collisions/collision_stream.h"
-#include "server/collisions/pair_question.h"
-#include "server/collisions/scene_stream.h"
+#include "hulld/v1/collision.grpc.pb.h"
+#include "server/collisions/collision_calls.h"
 #include "server/collisions/watch/collision_watch.h"
 
 namespace hulld::server {
+namespace {
 
-UnaryReactor* CollisionService::CheckCollision(CallContext* context, const Bytes* request,
-                                               Bytes* response) {
-  return CheckCall::Start(context, parts_.admission, Rpc::kCheckCollision, request, response,
-                          [this](CheckCall* call) { PairQuestion::Start(parts_, call); });
-}
+// The generated service, with methods that exchange bytes (message_bytes.h).
+using CollisionServiceOfBytes = v1::CollisionService::WithRawCallbackMethod_CheckCollision<
+    v1::CollisionService::WithRawCallbackMethod_BatchCheckCollisions<
+        v1::CollisionService::WithRawCallbackMethod_StreamCollisions<
+            v1::CollisionService::WithRawCallbackMethod_FindCollisions<
+                v1::CollisionService::WithRawCallbackMethod_WatchCollisions<
+                    v1::CollisionService::Service>>>>>;
 
-WriteReactor* CollisionService::BatchCheckCollisions(CallContext* context, const Bytes* request) {
-  return BatchStream::Launch(std::make_shared<BatchStream>(*context, parts_, *request));
-}
+class CollisionService : public CollisionServiceOfBytes {
+ public:
+  explicit CollisionService(const ServiceParts& parts) : parts_(parts) {}
 
-BidiReactor* CollisionService::StreamCollisions(CallContext* context) {
-  return CollisionStream::Launch(std::make_shared<CollisionStream>(*context, parts_));
-}
+  UnaryReactor* CheckCollision(CallContext* context, const Bytes* request,
+                               Bytes* response) override {
+    return StartCheck(*context, parts_, *request, response);
+  }
 
-WriteReactor* CollisionService::FindCollisions(CallContext* context, const Bytes* request) {
-  return SceneStream::Launch(std::make_shared<SceneStream>(*context, parts_, *request));
-}
+  WriteReactor* BatchCheckCollisions(CallContext* context, const Bytes* request) override {
+    return StartBatch(*context, parts_, *request);
+  }
 
-BidiReactor* CollisionService::WatchCollisions(CallContext* context) {
-  return CollisionWatch::Launch(std::make_shared<CollisionWatch>(*context, parts_));
+  BidiReactor* StreamCollisions(CallContext* context) override {
+    return StartCollisionStream(*context, parts_);
+  }
+
+  WriteReactor* FindCollisions(CallContext* context, const Bytes* request) override {
+    return StartScene(*context, parts_, *request);
+  }
+
+  BidiReactor* WatchCollisions(CallContext* context) override {
+    return StartCollisionWatch(*context, parts_);
+  }
+
+ private:
+  const ServiceParts& parts_;
+};
+
+}  // namespace
+
+std::unique_ptr<grpc::Service> MakeCollisionService(const ServiceParts& parts) {
+  return std::make_unique<CollisionService>(parts);
 }
 
 }  // namespace hulld::server

@@ -8,7 +8,7 @@
 
 #include "core/base/status_macros.h"
 #include "server/access/secret_file.h"
-#include "server/contract/status_map.h"
+#include "server/contract/errors.h"
 #include "server/migration/migration.h"
 #include "server/process/log.h"
 #include "server/store/postgres/postgres_store.h"

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "core/base/check.h"
-#include "server/contract/status_map.h"
+#include "server/contract/errors.h"
 #include "server/process/descriptors.h"
 #include "server/process/heap.h"
 

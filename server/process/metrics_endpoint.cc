@@ -96,19 +96,17 @@ class Connection : public std::enable_shared_from_this<Connection> {
   http::response<http::string_body> response_;
 };
 
-}  // namespace
-
 // The port and its thread. All functions except constructor and destructor run on that thread.
-class MetricsEndpoint::Listener {
+class Listener : public MetricsEndpoint {
  public:
   explicit Listener(const Metrics& metrics) : metrics_(metrics) {}
-  ~Listener() {
+  ~Listener() override {
     context_.stop();
     if (thread_.joinable()) thread_.join();
   }
 
-  // Returns the port. UNAVAILABLE: it cannot be bound.
-  absl::StatusOr<int> Listen(const ListenAddress& address) {
+  // UNAVAILABLE: the port cannot be bound.
+  absl::Status Listen(const ListenAddress& address) {
     error_code error;
     const auto found =
         tcp::resolver(context_).resolve(address.host, address.port, tcp::resolver::passive, error);
@@ -121,7 +119,8 @@ class MetricsEndpoint::Listener {
     if (error) return BindFailure(address, error.value(), error.message(), kFlag);
     Accept();
     thread_ = std::thread([this] { context_.run(); });
-    return acceptor_.local_endpoint().port();
+    address_ = address.Format(acceptor_.local_endpoint().port());
+    return absl::OkStatus();
   }
 
  private:
@@ -147,6 +146,8 @@ class MetricsEndpoint::Listener {
   std::thread thread_;
 };
 
+}  // namespace
+
 absl::StatusOr<ListenAddress> ParseMetricsAddress(const std::string& address, bool exposed) {
   HULLD_ASSIGN_OR_RETURN(ListenAddress parsed, ParseListenAddress(address, kFlag));
   if (parsed.is_unix()) {
@@ -162,19 +163,13 @@ absl::StatusOr<ListenAddress> ParseMetricsAddress(const std::string& address, bo
   return parsed;
 }
 
-MetricsEndpoint::MetricsEndpoint(std::unique_ptr<Listener> listener)
-    : listener_(std::move(listener)) {}
-MetricsEndpoint::~MetricsEndpoint() = default;
-
 absl::StatusOr<std::unique_ptr<MetricsEndpoint>> MetricsEndpoint::Start(const std::string& address,
                                                                         bool exposed,
                                                                         const Metrics& metrics) {
   HULLD_ASSIGN_OR_RETURN(const ListenAddress parsed, ParseMetricsAddress(address, exposed));
-  std::unique_ptr<MetricsEndpoint> endpoint(
-      new MetricsEndpoint(std::make_unique<Listener>(metrics)));
-  HULLD_ASSIGN_OR_RETURN(const int port, endpoint->listener_->Listen(parsed));
-  endpoint->address_ = parsed.Format(port);
-  return endpoint;
+  auto listener = std::make_unique<Listener>(metrics);
+  HULLD_RETURN_IF_ERROR(listener->Listen(parsed));
+  return listener;
 }
 
 }  // namespace hulld::server

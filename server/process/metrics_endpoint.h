@@ -26,20 +26,13 @@ class MetricsEndpoint {
                                                                 bool exposed,
                                                                 const Metrics& metrics);
 
-  MetricsEndpoint(const MetricsEndpoint&) = delete;
-  MetricsEndpoint& operator=(const MetricsEndpoint&) = delete;
-  ~MetricsEndpoint();
+  virtual ~MetricsEndpoint() = default;
 
   // The address with the chosen port.
   const std::string& address() const { return address_; }
 
- private:
-  class Listener;
-
-  explicit MetricsEndpoint(std::unique_ptr<Listener> listener);
-
+ protected:
   std::string address_;
-  std::unique_ptr<Listener> listener_;
 };
 
 }  // namespace hulld::server

@@ -21,34 +21,24 @@ class SharedLoop {
   // Several threads call it concurrently.
   using Work = std::function<void(size_t begin, size_t end)>;
 
-  // Starts to run `work` on disjoint ranges that cover [0, count), on up to `most_helpers` free
-  // threads of a pool, without blocking. Finish must follow; `work` is not called after it.
-  // Requires step > 0.
-  static std::shared_ptr<SharedLoop> Start(TaskPool& helpers, size_t max_helpers, size_t count,
-                                           size_t step, Work work) {
+  // Runs `work` on disjoint ranges that cover [0, count), on this thread and on up to `max_helpers`
+  // free threads of a pool. Waits for helpers that have started, but not for queued ones, so it may
+  // be called on any thread that may block. After should_stop, which may be empty and is called
+  // only on this thread, returns true, the remaining indices are skipped. Requires step > 0.
+  static void Run(TaskPool& helpers, size_t max_helpers, size_t count, size_t step, Work work,
+                  const std::function<bool()>& should_stop = {}) {
     HULLD_CHECK(step > 0);
     const auto loop = std::make_shared<SharedLoop>(count, step, std::move(work));
     const size_t steps = (count + step - 1) / step;
     for (size_t i = 1; i < steps && i <= max_helpers; ++i) {
       helpers.Submit([loop] { loop->TakePart({}); });
     }
-    return loop;
+    loop->TakePart(should_stop);
+    std::unique_lock lock(loop->mutex_);
+    while (loop->done_ < count) loop->all_done_.wait(lock);
   }
 
-  // Works on the remaining ranges on this thread, too. Waits for helpers that have started, but not
-  // for queued ones, so it may be called on any thread that may block. After should_stop, which may
-  // be empty and is called only on this thread, returns true, the remaining indices are skipped.
-  void Finish(const std::function<bool()>& should_stop) {
-    TakePart(should_stop);
-    std::unique_lock lock(mutex_);
-    while (done_ < count_) all_done_.wait(lock);
-  }
-
-  static void Run(TaskPool& helpers, size_t max_helpers, size_t count, size_t step, Work work) {
-    Start(helpers, max_helpers, count, step, std::move(work))->Finish({});
-  }
-
-  // For Start.
+  // For Run.
   SharedLoop(size_t count, size_t step, Work work)
       : count_(count), step_(step), work_(std::move(work)) {}
 

@@ -10,8 +10,7 @@
 #include "core/base/check.h"
 #include "core/base/status_macros.h"
 #include "core/hull/growth/hull_builder.h"
-#include "server/contract/error_info.h"
-#include "server/contract/status_map.h"
+#include "server/contract/errors.h"
 #include "server/contract/stopped_call.h"
 #include "server/registry/memory/memory_budget.h"
 #include "server/registry/memory/served_hull.h"
@@ -178,7 +177,7 @@ void KnownPlaced::SetBodies(std::span<const std::string> ids, Bodies bodies) {
   bodies_ = std::move(bodies);
   hull_ids_.clear();
   index_of_.clear();
-  hulls_ = {};
+  hulls_ = KnownHulls();
   for (size_t i = 0; i < bodies_.size(); ++i) {
     if (bodies_[i] == nullptr) AddHull(ids[i]);
   }
@@ -215,7 +214,7 @@ absl::Status CheckPiecePrefix(const Body& body, const std::string& prefix) {
 absl::StatusOr<Resolved> ResolvePlaced(Registry& registry, std::span<const std::string> ids,
                                        const PlacedLookup& lookup,
                                        const std::function<bool()>& should_stop) {
-  KnownPlaced known = KnownPlaced::ForOneLookup();
+  KnownPlaced known(/*for_one_lookup=*/true);
   return RefreshPlaced(registry, ids, known, lookup, should_stop);
 }
 

@@ -66,13 +66,8 @@ struct PlacedLookup {
 // State that a reader keeps between repeated lookups of the same IDs. Not thread-safe.
 class KnownPlaced {
  public:
-  KnownPlaced() = default;
-  // As KnownHulls::ForOneLookup.
-  static KnownPlaced ForOneLookup() {
-    KnownPlaced known;
-    known.hulls_ = KnownHulls::ForOneLookup();
-    return known;
-  }
+  // for_one_lookup: as for KnownHulls.
+  explicit KnownPlaced(bool for_one_lookup = false) : hulls_(for_one_lookup) {}
 
   // Bytes used for bodies. Hulls use KnownHulls::kBytesEach per ID.
   size_t BodyBytes() const;

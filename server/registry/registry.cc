@@ -61,7 +61,7 @@ absl::Status Registry::Load() {
 absl::StatusOr<Resolved> Registry::Resolve(std::span<const std::string> ids,
                                            const std::function<bool()>& should_stop,
                                            const ReadPlan& plan) {
-  KnownHulls known = KnownHulls::ForOneLookup();
+  KnownHulls known(/*for_one_lookup=*/true);
   return reader_.Refresh(ids, known, should_stop, plan);
 }
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "server/contract/error_info.h"
+#include "server/contract/errors.h"
 #include "server/process/random_id.h"
 #include "server/store/store.h"
 

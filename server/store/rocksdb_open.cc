@@ -15,7 +15,7 @@
 #include <utility>
 
 #include "core/base/status_macros.h"
-#include "server/contract/status_map.h"
+#include "server/contract/errors.h"
 #include "server/process/random_id.h"
 #include "server/store/rocksdb_store.h"
 #include "server/store/store_errors.h"

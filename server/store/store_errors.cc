@@ -6,7 +6,7 @@
 #include <cerrno>
 #include <cstring>
 
-#include "server/contract/error_info.h"
+#include "server/contract/errors.h"
 
 namespace hulld::server {
 

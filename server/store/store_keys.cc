@@ -10,7 +10,7 @@
 #include <cstring>
 #include <utility>
 
-#include "server/contract/status_map.h"
+#include "server/contract/errors.h"
 #include "server/store/store_errors.h"
 
 namespace hulld::server {

@@ -7,8 +7,7 @@
 #include <vector>
 
 #include "core/query/terms/answer.h"
-#include "server/contract/error_info.h"
-#include "server/contract/status_map.h"
+#include "server/contract/errors.h"
 #include "server/settings/config.h"
 #include "server/wire/encode.h"
 

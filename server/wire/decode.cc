@@ -11,9 +11,7 @@
 #include <optional>
 
 #include "core/base/status_macros.h"
-#include "server/contract/error_info.h"
-#include "server/contract/limit_error.h"
-#include "server/contract/status_map.h"
+#include "server/contract/errors.h"
 #include "server/settings/config.h"
 
 namespace hulld::server {

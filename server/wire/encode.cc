@@ -6,7 +6,7 @@
 #include <variant>
 
 #include "core/base/status_macros.h"
-#include "server/contract/error_info.h"
+#include "server/contract/errors.h"
 #include "server/settings/config.h"
 
 namespace hulld::server {

@@ -5,7 +5,7 @@
 
 #include "core/base/status_macros.h"
 #include "server/collisions/placed/scene_groups.h"
-#include "server/contract/limit_error.h"
+#include "server/contract/errors.h"
 
 namespace hulld::server {
 namespace {

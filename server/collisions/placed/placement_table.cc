@@ -13,9 +13,7 @@
 
 #include "core/base/check.h"
 #include "core/base/status_macros.h"
-#include "server/contract/error_info.h"
-#include "server/contract/limit_error.h"
-#include "server/contract/status_map.h"
+#include "server/contract/errors.h"
 #include "server/settings/config.h"
 #include "server/wire/decode.h"
 #include "server/wire/encode.h"
@@ -320,7 +318,7 @@ PlacedLookup PlacementTable::LookupFor(const QueryOptions& options, const ReadPl
 
 absl::Status PlacementTable::Resolve(Registry& registry, const QueryOptions& options,
                                      const ReadPlan& plan) {
-  KnownPlaced known = KnownPlaced::ForOneLookup();
+  KnownPlaced known(/*for_one_lookup=*/true);
   return ResolveFrom(registry, known, options, plan);
 }
 

@@ -6,9 +6,7 @@
 
 #include "core/base/status_macros.h"
 #include "core/query/body/body_search.h"
-#include "server/contract/error_info.h"
-#include "server/contract/limit_error.h"
-#include "server/contract/status_map.h"
+#include "server/contract/errors.h"
 #include "server/wire/decode.h"
 
 namespace hulld::server {

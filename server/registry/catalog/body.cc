@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "core/base/check.h"
-#include "server/contract/error_info.h"
+#include "server/contract/errors.h"
 
 namespace hulld::server {
 

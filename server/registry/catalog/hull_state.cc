@@ -21,11 +21,9 @@ void HullState::Submit() {
   ++in_flight_;
 }
 
-bool HullState::EndWork() {
+void HullState::EndWork() {
   HULLD_CHECK(work_ != Work::kIdle);
-  const bool kept = work_ != Work::kReverting;
   work_ = Work::kIdle;
-  return kept;
 }
 
 void HullState::StartEnding() {

@@ -85,8 +85,8 @@ class HullState {
   // Counts the chunk being built as in flight.
   void Submit();
   // Ends the work of the scheduled or building thread, which has returned the builder if it owned
-  // it. Returns false after kReverting: the builder then contains refused points.
-  bool EndWork();
+  // it.
+  void EndWork();
 
   // Submits a deletion or a replacement.
   void StartEnding();

@@ -52,13 +52,8 @@ class RecentChanges {
 // repeats its request keeps this between calls (HullReader::Refresh). Not thread-safe.
 class KnownHulls {
  public:
-  KnownHulls() = default;
-  // For a single lookup, which moves the views into its result instead of copying them.
-  static KnownHulls ForOneLookup() {
-    KnownHulls known;
-    known.is_for_one_lookup_ = true;
-    return known;
-  }
+  // for_one_lookup: a single lookup, which moves the views into its result instead of copying them.
+  explicit KnownHulls(bool for_one_lookup = false) : is_for_one_lookup_(for_one_lookup) {}
 
   // Sets the IDs; all hulls must be looked up. Does nothing after the first call: the IDs stay the
   // same. Cost: O(n).
@@ -107,7 +102,7 @@ class KnownHulls {
   // Returns the views in the order of the request.
   std::vector<absl::StatusOr<HullView>> Views(std::span<const std::string> ids);
 
-  bool is_for_one_lookup_ = false;
+  bool is_for_one_lookup_;
   bool has_begun_ = false;
   std::vector<Known> hulls_;
   // Index of the hull of each requested ID.

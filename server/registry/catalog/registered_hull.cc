@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "core/base/check.h"
-#include "server/contract/error_info.h"
+#include "server/contract/errors.h"
 #include "server/registry/catalog/hull_table.h"
 
 namespace hulld::server {

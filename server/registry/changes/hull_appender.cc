@@ -5,9 +5,7 @@
 
 #include "core/base/check.h"
 #include "core/base/status_macros.h"
-#include "server/contract/error_info.h"
-#include "server/contract/limit_error.h"
-#include "server/contract/status_map.h"
+#include "server/contract/errors.h"
 #include "server/contract/stopped_call.h"
 #include "server/registry/catalog/registered_hull.h"
 #include "server/registry/changes/local_changes.h"

@@ -8,7 +8,7 @@
 
 #include "core/base/check.h"
 #include "core/base/status_macros.h"
-#include "server/contract/error_info.h"
+#include "server/contract/errors.h"
 #include "server/registry/catalog/body.h"
 #include "server/registry/catalog/registered_hull.h"
 

@@ -73,10 +73,8 @@ std::vector<LoadedHull> LoadEach(Store& store, std::span<const StoredHull> hulls
       loaded[i] = MakeLive(hulls[i], std::move(points[i - begin]));
     }
   };
-  SharedLoop::Start(helpers, std::min(helpers.threads(), hulls.size() / kWorthAThread),
-                    hulls.size(), std::clamp<size_t>(hulls.size() / kMinSteps, 1, kMaxPerStep),
-                    load)
-      ->Finish(should_stop);
+  SharedLoop::Run(helpers, std::min(helpers.threads(), hulls.size() / kWorthAThread), hulls.size(),
+                  std::clamp<size_t>(hulls.size() / kMinSteps, 1, kMaxPerStep), load, should_stop);
   return loaded;
 }
 

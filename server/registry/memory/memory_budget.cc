@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "core/base/check.h"
-#include "server/contract/limit_error.h"
+#include "server/contract/errors.h"
 
 namespace hulld::server {
 namespace {

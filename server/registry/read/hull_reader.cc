@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/base/status_macros.h"
-#include "server/contract/limit_error.h"
+#include "server/contract/errors.h"
 #include "server/contract/stopped_call.h"
 #include "server/registry/catalog/registered_hull.h"
 #include "server/registry/memory/hull_loader.h"

@@ -8,8 +8,7 @@
 #include <utility>
 
 #include "core/base/check.h"
-#include "server/contract/error_info.h"
-#include "server/contract/limit_error.h"
+#include "server/contract/errors.h"
 #include "server/registry/catalog/registered_hull.h"
 #include "server/settings/resource_limits.h"
 

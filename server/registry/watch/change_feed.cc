@@ -6,7 +6,7 @@
 
 #include "core/base/check.h"
 #include "core/base/status_macros.h"
-#include "server/contract/error_info.h"
+#include "server/contract/errors.h"
 #include "server/registry/catalog/registered_hull.h"
 
 namespace hulld::server {

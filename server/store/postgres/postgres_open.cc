@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "core/base/status_macros.h"
-#include "server/contract/status_map.h"
+#include "server/contract/errors.h"
 #include "server/contract/stopped_call.h"
 #include "server/process/random_id.h"
 #include "server/store/postgres/batch_statements.h"

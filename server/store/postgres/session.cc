@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "core/base/status_macros.h"
-#include "server/contract/error_info.h"
+#include "server/contract/errors.h"
 
 namespace hulld::server {
 namespace {

@@ -12,9 +12,7 @@
 #include "client/calls/grpc_status.h"
 #include "client/client.h"
 #include "server/access/caller.h"
-#include "server/contract/error_info.h"
-#include "server/contract/limit_error.h"
-#include "server/contract/status_map.h"
+#include "server/contract/errors.h"
 #include "tests/server/harness/test_server.h"
 
 namespace hulld::server {

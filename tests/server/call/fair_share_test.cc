@@ -12,7 +12,7 @@
 
 #include "server/call/admission.h"
 #include "server/call/call_lifetime.h"
-#include "server/contract/limit_error.h"
+#include "server/contract/errors.h"
 #include "server/network/connection_table.h"
 #include "server/network/peer_address.h"
 

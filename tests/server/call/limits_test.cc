@@ -16,8 +16,7 @@
 #include <vector>
 
 #include "server/call/admission.h"
-#include "server/contract/limit_error.h"
-#include "server/contract/status_map.h"
+#include "server/contract/errors.h"
 #include "tests/server/harness/test_server.h"
 
 namespace hulld::server {

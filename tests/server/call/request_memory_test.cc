@@ -19,8 +19,7 @@
 #include "hulld/v1/hull.pb.h"
 #include "server/call/message_bytes.h"
 #include "server/call/message_layout.h"
-#include "server/contract/error_info.h"
-#include "server/contract/limit_error.h"
+#include "server/contract/errors.h"
 
 namespace hulld::server {
 namespace request_memory_test {

@@ -16,7 +16,7 @@
 #include <utility>
 #include <vector>
 
-#include "server/contract/error_info.h"
+#include "server/contract/errors.h"
 #include "server/store/memory_store.h"
 #include "tests/server/harness/store_fixture.h"
 

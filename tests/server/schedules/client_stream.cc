@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "server/contract/error_info.h"
+#include "server/contract/errors.h"
 #include "tests/server/schedules/client.h"
 
 namespace hulld::server {

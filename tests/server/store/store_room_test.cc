@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "server/contract/error_info.h"
+#include "server/contract/errors.h"
 #include "tests/server/harness/faulty_file_system.h"
 #include "tests/server/harness/small_disk.h"
 #include "tests/server/harness/store_fixture.h"

@@ -10,8 +10,8 @@
 #include <string>
 #include <utility>
 
+#include "server/contract/errors.h"
 #include "server/contract/hull_id.h"
-#include "server/contract/status_map.h"
 #include "server/process/listen_address.h"
 #include "server/process/log.h"
 #include "server/store/memory_store.h"

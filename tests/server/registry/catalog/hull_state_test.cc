@@ -82,7 +82,8 @@ TEST(HullState, ChunksOverlapUpToTheirLimit) {
     state.StartBuilding();
     EXPECT_EQ(state.work(), Work::kBuilding);
     state.Submit();
-    EXPECT_TRUE(state.EndWork());
+    EXPECT_EQ(state.work(), Work::kBuilding);
+    state.EndWork();
     EXPECT_EQ(state.in_flight(), i);
   }
   EXPECT_FALSE(state.can_schedule());
@@ -98,7 +99,7 @@ TEST(HullState, ARefusalReachesTheThreadThatBuildsOnIt) {
   state.StartBuilding();
   state.Refuse();
   EXPECT_EQ(state.work(), Work::kReverting);
-  EXPECT_FALSE(state.EndWork());
+  state.EndWork();
   EXPECT_TRUE(state.quiet());
 }
 
@@ -110,13 +111,15 @@ TEST(HullState, ARefusalDoesNotConcernAThreadThatHasNotBegun) {
   EXPECT_EQ(state.work(), Work::kScheduled);
   state.StartBuilding();
   state.Submit();
-  EXPECT_TRUE(state.EndWork());
+  EXPECT_EQ(state.work(), Work::kBuilding);
+  state.EndWork();
 }
 
 TEST(HullState, AScheduledChunkMayEndWithoutBeingBuilt) {
   HullState state = HullState::Present();
   state.Schedule();
-  EXPECT_TRUE(state.EndWork());
+  EXPECT_EQ(state.work(), Work::kScheduled);
+  state.EndWork();
   EXPECT_TRUE(state.quiet());
 }
 
@@ -133,7 +136,8 @@ TEST(HullState, ADamagedHullCanOnlyEnd) {
 TEST(HullState, DamageIsFoundByAThreadThatWorks) {
   HullState state = Building();
   state.Damage(absl::DataLossError("damaged"));
-  EXPECT_TRUE(state.EndWork());
+  EXPECT_EQ(state.work(), Work::kBuilding);
+  state.EndWork();
   EXPECT_EQ(state.damage(), absl::DataLossError("damaged"));
 }
 
@@ -141,7 +145,7 @@ TEST(HullState, APeerChangeReachesTheThreadThatBuilds) {
   HullState state = Building();
   state.Supersede();
   EXPECT_EQ(state.work(), Work::kReverting);
-  EXPECT_FALSE(state.EndWork());
+  state.EndWork();
   EXPECT_EQ(state.life(), Life::kPresent);
 
   // It has not started, and finds the new version.
@@ -152,12 +156,14 @@ TEST(HullState, APeerChangeReachesTheThreadThatBuilds) {
   // It has not started, and finds no hull.
   state.Vanish();
   EXPECT_TRUE(state.gone());
-  EXPECT_TRUE(state.EndWork());
+  EXPECT_EQ(state.work(), Work::kScheduled);
+  state.EndWork();
 
   HullState building = Building();
   building.Vanish();
   EXPECT_TRUE(building.gone());
-  EXPECT_FALSE(building.EndWork());
+  EXPECT_EQ(building.work(), Work::kReverting);
+  building.EndWork();
 }
 
 using HullStateDeathTest = ::testing::Test;

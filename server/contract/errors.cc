@@ -1,6 +1,8 @@
-#include "server/contract/error_info.h"
+#include "server/contract/errors.h"
 
 #include <absl/strings/cord.h>
+#include <absl/strings/numbers.h>
+#include <absl/strings/str_cat.h>
 #include <absl/strings/strip.h>
 
 namespace hulld::server {
@@ -31,7 +33,27 @@ v1::ErrorReason ImpliedReason(absl::StatusCode code) {
   }
 }
 
+// Metadata keys of error.proto.
+constexpr char kFlag[] = "flag";
+constexpr char kLimit[] = "limit";
+// Status payload, read at the end of the call.
+constexpr char kRetryPayload[] = "hulld/retry-ms";
+
 }  // namespace
+
+grpc::Status ToGrpc(const absl::Status& status) {
+  if (status.ok()) return grpc::Status::OK;
+  return grpc::Status(ToGrpc(status.code()), std::string(status.message()));
+}
+
+absl::Status Prefixed(const std::string& prefix, const absl::Status& status) {
+  if (status.ok()) return status;
+  absl::Status prefixed(status.code(), absl::StrCat(prefix, status.message()));
+  status.ForEachPayload([&prefixed](absl::string_view type, const absl::Cord& payload) {
+    prefixed.SetPayload(type, payload);
+  });
+  return prefixed;
+}
 
 absl::Status WithReason(absl::Status status, v1::ErrorReason reason,
                         std::initializer_list<MetadataEntry> metadata) {
@@ -72,6 +94,43 @@ std::optional<rpc::ErrorInfo> ErrorInfoOf(const absl::Status& status) {
   const v1::ErrorReason reason = ImpliedReason(status.code());
   if (reason == v1::ERROR_REASON_UNSPECIFIED) return std::nullopt;
   return ErrorInfoOf(WithReason(status, reason));
+}
+
+absl::Status AtLimit(const absl::Status& status, uint64_t limit, const std::string& flag) {
+  return WithReason(absl::ResourceExhaustedError(absl::StrCat(status.message(), " (--", flag, ")")),
+                    v1::ERROR_REASON_LIMIT_EXCEEDED, {{kFlag, flag}, {kLimit, limit}});
+}
+
+absl::Status LimitExceeded(const std::string& what, const std::string& limit,
+                           const std::string& flag) {
+  return WithReason(
+      absl::ResourceExhaustedError(absl::StrCat(what, "; the limit is ", limit, " (--", flag, ")")),
+      v1::ERROR_REASON_LIMIT_EXCEEDED, {{kFlag, flag}, {kLimit, limit}});
+}
+
+absl::Status LimitExceeded(const std::string& what, uint64_t limit, const std::string& flag) {
+  return LimitExceeded(what, std::to_string(limit), flag);
+}
+
+absl::Status Overloaded(const std::string& what, uint64_t limit, const std::string& flag,
+                        std::chrono::milliseconds retry) {
+  absl::Status status = WithReason(LimitExceeded(what, limit, flag), v1::ERROR_REASON_OVERLOADED,
+                                   {{kFlag, flag}, {kLimit, limit}});
+  status.SetPayload(kRetryPayload, absl::Cord(std::to_string(retry.count())));
+  return status;
+}
+
+std::optional<std::string> ExceededLimit(const absl::Status& status) {
+  return MetadataOf(status, kFlag);
+}
+
+std::optional<std::chrono::milliseconds> RetryAfter(const absl::Status& status) {
+  const absl::optional<absl::Cord> retry = status.GetPayload(kRetryPayload);
+  int64_t milliseconds = 0;
+  if (!retry.has_value() || !absl::SimpleAtoi(std::string(*retry), &milliseconds)) {
+    return std::nullopt;
+  }
+  return std::chrono::milliseconds(milliseconds);
 }
 
 }  // namespace hulld::server
