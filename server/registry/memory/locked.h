@@ -159,27 +159,32 @@ class Locked {
     return absl::OkStatus();
   }
 
-  // Calls start(done), then blocks as Await until done(result) has been called with the mutex held,
-  // perhaps on another thread, and returns the result.
-  template <typename Result, typename Start>
-  Result AwaitResult(const std::function<bool()>& should_stop, const Start& start) {
+  // Calls start(done), then blocks as Await until done(locked, status) has been called with the
+  // mutex held, perhaps on another thread, and returns that status.
+  template <typename Start>
+  absl::Status AwaitCall(const std::function<bool()>& should_stop, const Start& start) {
     struct Wait {
       ConditionVariable changed;
-      std::optional<Result> result;
+      std::optional<absl::Status> result;
     };
     const auto wait = std::make_shared<Wait>();
-    start([wait](Result result) {
-      wait->result = std::move(result);
+    start([wait](Locked&, const absl::Status& status) {
+      wait->result = status;
       wait->changed.notify_all();
     });
-    absl::Status s = Await(wait->changed, should_stop, [&] { return wait->result.has_value(); });
-    if (!s.ok()) return s;
-    return *std::move(wait->result);
+    const absl::Status stopped =
+        Await(wait->changed, should_stop, [&] { return wait->result.has_value(); });
+    return stopped.ok() ? *wait->result : stopped;
   }
 
   // Counts a lookup within this hold of the mutex.
   void NoteLookup() { ++mutex_.lookups_; }
   uint64_t lookups() const { return mutex_.lookups_; }
+  // As NoteLookup, but first yields if this hold has reached kMaxLookupsPerHold.
+  void NoteLookupOrYield() {
+    if (lookups() >= kMaxLookupsPerHold) Yield();
+    NoteLookup();
+  }
 
   void Afterwards(std::function<void()> task) { afterwards_.push_back(std::move(task)); }
   // Defers a task that acquires the mutex again.

@@ -47,20 +47,16 @@ void ReadBarrier::End() {
   if (has_peers()) feed_->OnPeerCommit(nullptr);
 }
 
-absl::Status ReadBarrier::AwaitCommits(Locked& locked, const std::function<bool()>& should_stop) {
-  return locked.AwaitResult<absl::Status>(should_stop, [&](const auto& done) {
-    committer_.StartBarrier(locked, [done](Locked&, const absl::Status& s) { done(s); });
-  });
-}
-
 absl::Status ReadBarrier::AwaitPeers(const std::function<bool()>& should_stop) {
   if (!has_peers()) return absl::OkStatus();
   Locked locked(state_.mutex);
-  return AwaitCommits(locked, should_stop);
+  return AwaitPeers(locked, should_stop);
 }
 
 absl::Status ReadBarrier::AwaitPeers(Locked& locked, const std::function<bool()>& should_stop) {
-  return has_peers() ? AwaitCommits(locked, should_stop) : absl::OkStatus();
+  if (!has_peers()) return absl::OkStatus();
+  return locked.AwaitCall(should_stop,
+                          [&](const auto& done) { committer_.StartBarrier(locked, done); });
 }
 
 std::optional<nanoseconds> ReadBarrier::TryFresh(const Freshness& freshness) {

@@ -62,15 +62,11 @@ class ReadBarrier : public Committer::Peers {
   absl::Status Begin(Locked& locked, std::vector<PeerChangeListener*> listeners);
   void End();
 
-  // Blocks until all changes that were submitted here, or committed by peer servers, before the
-  // call are applied. CANCELLED: should_stop, which may be empty, returned true. UNAVAILABLE: the
-  // store cannot be queried. Cost: one store query, shared by all waiting calls.
-  absl::Status AwaitCommits(Locked& locked, const std::function<bool()>& should_stop);
-
   // Read barrier: blocks until all changes that peer servers committed before the call are applied.
   // Required before functions without a freshness parameter (RecordReader::List,
-  // RecordReader::FindBodies). Not for gRPC threads. Errors and cost as AwaitCommits; no effect
-  // without peer servers.
+  // RecordReader::FindBodies). Not for gRPC threads. CANCELLED: should_stop, which may be empty,
+  // returned true. UNAVAILABLE: the store cannot be queried. Cost: one store query, shared by all
+  // waiting calls; none without peer servers.
   absl::Status AwaitPeers(const std::function<bool()>& should_stop);
   absl::Status AwaitPeers(Locked& locked, const std::function<bool()>& should_stop);
 

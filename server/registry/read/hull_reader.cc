@@ -213,8 +213,7 @@ void HullReader::LoadMany(Locked& locked, const HullsRead& read) {
   uint64_t points = 0;
   // due_ is processed from the back.
   for (size_t n = 0; n < std::min(hulls.due_.size(), kMaxHulls); ++n) {
-    if (locked.lookups() >= kMaxLookupsPerHold) locked.Yield();
-    locked.NoteLookup();
+    locked.NoteLookupOrYield();
     KnownHulls::Known& known = hulls.hulls_[hulls.due_[hulls.due_.size() - 1 - n]];
     const std::string& id = read.ids[known.first];
     const HullPointer hull = state_.IsKnown(id) ? state_.FindVisible(id) : nullptr;
@@ -237,8 +236,7 @@ void HullReader::LoadMany(Locked& locked, const HullsRead& read) {
   std::vector<LoadedHull> loaded = LoadEach(state_.store, stored, loaders_, read.should_stop);
   locked.Lock();
   for (size_t i = 0; i < chosen.size(); ++i) {
-    if (locked.lookups() >= kMaxLookupsPerHold) locked.Yield();
-    locked.NoteLookup();
+    locked.NoteLookupOrYield();
     RegisteredHull& hull = *chosen[i]->found;
     hull.EndLoading();
     const bool is_current = hull.committed().record.revision == stored[i].record.revision;

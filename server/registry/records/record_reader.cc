@@ -108,8 +108,8 @@ absl::Status RecordReader::AwaitKnown(Locked& locked, std::span<const std::strin
     if (is_new) own.push_back(reading);
     if (awaited == nullptr) awaited = reading;
   }
-  return locked.AwaitResult<absl::Status>(should_stop, [&](const auto& done) {
-    awaited->waiting.push_back([done](Locked&, const absl::Status& s) { done(s); });
+  return locked.AwaitCall(should_stop, [&](const auto& done) {
+    awaited->waiting.push_back(done);
     if (!own.empty()) ReadRecords(locked, own);
   });
 }
@@ -159,16 +159,18 @@ void RecordReader::ReadRecords(Locked& locked, const Readings& readings) {
   for (const auto& reading : readings) ids.push_back(reading->id);
   const uint64_t asked_at = state_.revision();
   locked.Unlock();
-  absl::StatusOr<FoundRecords> found = state_.store.FindRecords(ids);
+  const auto found =
+      std::make_shared<const absl::StatusOr<FoundRecords>>(state_.store.FindRecords(ids));
   locked.Lock();
-  WhenReached(locked, asked_at, std::move(found),
-              [this, readings](Locked& later, const absl::StatusOr<FoundRecords>& reached) {
-                TakeRecords(later, readings, reached);
+  WhenReached(locked, asked_at, found,
+              [this, readings, found](Locked& later, const absl::Status& status) {
+                TakeRecords(later, readings, found, status);
               });
 }
 
-void RecordReader::TakeRecords(Locked& locked, const Readings& readings,
-                               const absl::StatusOr<FoundRecords>& found) {
+// Ends the readings with the records, or with an error.
+void RecordReader::TakeRecords(Locked& locked, const Readings& readings, const Found& found,
+                               const absl::Status& status) {
   // Evicts first, so that the new records are still known when their callers resume.
   for (size_t i = 0; i < readings.size(); ++i) state_.hulls.RestSome(locked);
   state_.bodies.DropSome(locked);
@@ -176,12 +178,12 @@ void RecordReader::TakeRecords(Locked& locked, const Readings& readings,
   for (const auto& reading : readings) {
     const auto current = readings_.find(reading->id);
     if (current == readings_.end() || current->second != reading) continue;
-    if (found.ok()) TakeRecord(locked, reading->id, *found);
+    if (status.ok()) TakeRecord(locked, reading->id, **found);
     readings_.erase(current);
     open.push_back(reading);
   }
   for (const auto& reading : open) {
-    for (const Committer::Barrier& done : reading->waiting) done(locked, found.status());
+    for (const Committer::Barrier& done : reading->waiting) done(locked, status);
   }
 }
 
@@ -208,18 +210,17 @@ void RecordReader::OnPeerChange(Locked& /*locked*/, const std::string& id,
   readings_.erase(found);
 }
 
-void RecordReader::WhenReached(Locked& locked, uint64_t asked_at,
-                               absl::StatusOr<FoundRecords> found, FoundTaker take) {
-  if (found.ok() && found->revision < asked_at) found = WentBack(found->revision, asked_at);
-  if (!found.ok() || !IsBehind(*found)) return take(locked, found);
+void RecordReader::WhenReached(Locked& locked, uint64_t asked_at, const Found& found,
+                               Committer::Barrier take) {
+  if (!found->ok()) return take(locked, found->status());
+  const uint64_t revision = (*found)->revision;
+  if (revision < asked_at) return take(locked, WentBack(revision, asked_at));
+  if (!IsBehind(locked, **found)) return take(locked, absl::OkStatus());
   // After this round of the committer, the registry includes everything that the store contained.
-  const auto kept = std::make_shared<const FoundRecords>(*std::move(found));
   committer_.AddBarrier(
-      [this, kept, take = std::move(take)](Locked& later, const absl::Status& status) {
+      [this, revision, take = std::move(take)](Locked& later, const absl::Status& status) {
         const uint64_t known = state_.revision();
-        if (!status.ok()) return take(later, status);
-        if (kept->revision > known) return take(later, IsAhead(kept->revision, known));
-        take(later, *kept);
+        take(later, status.ok() && revision > known ? IsAhead(revision, known) : status);
       });
 }
 
@@ -234,20 +235,23 @@ bool RecordReader::IsBehind(const std::string& id, const absl::StatusOr<StoredHu
 }
 
 // Returns true if the records are newer than the registry: committed, perhaps by a peer server, but
-// not yet applied. An answer from them would be followed by an older one from memory.
-bool RecordReader::IsBehind(const FoundRecords& found) const {
-  return found.revision > state_.revision() ||
-         std::ranges::any_of(found.hulls,
-                             [&](const auto& hull) { return IsBehind(hull.first, hull.second); });
+// not yet applied. An answer from them would be followed by an older one from memory. The registry
+// only advances, so releasing the mutex between hulls is safe.
+bool RecordReader::IsBehind(Locked& locked, const FoundRecords& found) const {
+  if (found.revision > state_.revision()) return true;
+  return std::ranges::any_of(found.hulls, [&](const auto& hull) {
+    locked.NoteLookupOrYield();
+    return IsBehind(hull.first, hull.second);
+  });
 }
 
-absl::StatusOr<FoundRecords> RecordReader::Query(const PageRequest& request) {
+RecordReader::Found RecordReader::Query(const PageRequest& request) {
   absl::StatusOr<FoundRecords> found =
       request.ids.empty() ? state_.store.ListRecords(request.prefix, request.after,
                                                      request.page_size, request.kinds)
                           : state_.store.FindRecords(request.ids);
   if (found.ok() && !request.kinds.bodies) found->bodies.clear();
-  return found;
+  return std::make_shared<const absl::StatusOr<FoundRecords>>(std::move(found));
 }
 
 absl::StatusOr<RecordPage> RecordReader::List(std::string prefix, std::string after,
@@ -265,14 +269,11 @@ absl::StatusOr<RecordPage> RecordReader::List(std::string prefix, std::string af
   }
   const uint64_t asked_at = state_.revision();
   locked.Unlock();
-  absl::StatusOr<FoundRecords> found = Query(request);
+  const Found found = Query(request);
   locked.Lock();
-  return locked.AwaitResult<absl::StatusOr<RecordPage>>(should_stop, [&](const auto& done) {
-    WhenReached(locked, asked_at, std::move(found),
-                [this, done](Locked&, const absl::StatusOr<FoundRecords>& reached) {
-                  done(Describe(reached));
-                });
-  });
+  HULLD_RETURN_IF_ERROR(locked.AwaitCall(
+      should_stop, [&](const auto& done) { WhenReached(locked, asked_at, found, done); }));
+  return Describe(locked, **found);
 }
 
 // The registry may know more about this version than its record: its box, or its damage.
@@ -292,11 +293,14 @@ HullChange RecordReader::Describe(const std::string& id,
   return described.record == change.record ? described : change;
 }
 
-absl::StatusOr<RecordPage> RecordReader::Describe(const absl::StatusOr<FoundRecords>& found) const {
-  if (!found.ok()) return found.status();
-  RecordPage page = {.store_revision = found->revision, .more = found->more};
-  for (const auto& [id, stored] : found->hulls) page.entries.push_back(Describe(id, stored));
-  for (const auto& [id, stored] : found->bodies) {
+// Describes a page whose revision the registry has reached. Releases the mutex between hulls.
+RecordPage RecordReader::Describe(Locked& locked, const FoundRecords& found) const {
+  RecordPage page = {.store_revision = found.revision, .more = found.more};
+  for (const auto& [id, stored] : found.hulls) {
+    locked.NoteLookupOrYield();
+    page.entries.push_back(Describe(id, stored));
+  }
+  for (const auto& [id, stored] : found.bodies) {
     const StoredBody nothing = {{id, 0, 0}, {}, {}};
     page.entries.push_back(Body::Describe(stored.ok() ? *stored : nothing, stored.status()));
   }
@@ -347,12 +351,12 @@ void RecordReader::ReadPage(Locked& locked, PageRequest request,
   loaders_.Submit(
       [this, request = std::move(request), done = std::move(done),
        asked_at = state_.revision()]() mutable {
-        absl::StatusOr<FoundRecords> found = Query(request);
+        const Found found = Query(request);
         Locked later(state_.mutex);
-        WhenReached(later, asked_at, std::move(found),
-                    [this, done = std::move(done)](Locked& now,
-                                                   const absl::StatusOr<FoundRecords>& reached) {
-                      done(now, Describe(reached));
+        WhenReached(later, asked_at, found,
+                    [this, found, done = std::move(done)](Locked& now, const absl::Status& status) {
+                      if (!status.ok()) return done(now, status);
+                      done(now, Describe(now, **found));
                     });
       },
       kWatchReader);

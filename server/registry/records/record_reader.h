@@ -102,8 +102,8 @@ class RecordReader : public PeerChangeListener, public PageSource {
     Task task;
   };
   using Readings = std::vector<std::shared_ptr<Reading>>;
-  // Called with the registry's mutex held, with the records valid from then on, or an error.
-  using FoundTaker = std::function<void(Locked&, const absl::StatusOr<FoundRecords>&)>;
+  // The result of a store query, while the registry catches up with it.
+  using Found = std::shared_ptr<const absl::StatusOr<FoundRecords>>;
 
   // Returns the read of the record of an ID, and true if it is new.
   std::pair<std::shared_ptr<Reading>, bool> Join(const std::string& id);
@@ -115,22 +115,21 @@ class RecordReader : public PeerChangeListener, public PageSource {
   void RunWhenReady(Locked& locked, const std::shared_ptr<const ReadyTask>& ready);
   void ReadDue();
   void ReadRecords(Locked& locked, const Readings& readings);
-  void TakeRecords(Locked& locked, const Readings& readings,
-                   const absl::StatusOr<FoundRecords>& found);
+  void TakeRecords(Locked& locked, const Readings& readings, const Found& found,
+                   const absl::Status& status);
   void TakeRecord(Locked& locked, const std::string& id, const FoundRecords& found);
 
-  // Passes `found` to `take`, now or on the committer's thread. asked_at: the registry's revision
-  // at the time of the store query. UNAVAILABLE: the store went back, or cannot report the changes
-  // in between.
-  void WhenReached(Locked& locked, uint64_t asked_at, absl::StatusOr<FoundRecords> found,
-                   FoundTaker take);
+  // Calls `take`, now or on the committer's thread, when the records found are valid, or with an
+  // error, such as theirs. asked_at: the registry's revision at the time of the store query.
+  // UNAVAILABLE: the store went back, or cannot report the changes in between.
+  void WhenReached(Locked& locked, uint64_t asked_at, const Found& found, Committer::Barrier take);
   bool IsBehind(const std::string& id, const absl::StatusOr<StoredHull>& stored) const;
-  bool IsBehind(const FoundRecords& found) const;
+  bool IsBehind(Locked& locked, const FoundRecords& found) const;
 
   // Queries the store for a page.
-  absl::StatusOr<FoundRecords> Query(const PageRequest& request);
+  Found Query(const PageRequest& request);
   HullChange Describe(const std::string& id, const absl::StatusOr<StoredHull>& stored) const;
-  absl::StatusOr<RecordPage> Describe(const absl::StatusOr<FoundRecords>& found) const;
+  RecordPage Describe(Locked& locked, const FoundRecords& found) const;
   RecordPage CataloguedPage(const PageRequest& request) const;
 
   RegistryState& state_;
