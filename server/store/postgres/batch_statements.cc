@@ -136,6 +136,16 @@ void AddRows(const std::string& hull_id, const HullRows& rows, Encoder& puts) {
   }
 }
 
+// Returns the create_revision of the incarnation that a change ends; 0: none. It is unknown for a
+// damaged hull; the value 1 then records that the hull existed, which peer servers need to know.
+uint64_t BeganOfEnded(const Change& change) {
+  const auto known = [](uint64_t revision) { return std::max<uint64_t>(revision, 1); };
+  if (change.replaced.has_value()) return known(change.replaced->record.create_revision);
+  if (!change.deleted) return 0;
+  return known(change.body != nullptr ? change.body->record.create_revision
+                                      : change.hull.record.create_revision);
+}
+
 }  // namespace
 
 std::string PrepareBatchStatements() {
@@ -215,6 +225,31 @@ std::vector<Statement> StatementsOf(std::span<const Change* const> changes) {
   std::vector<Statement> statements = std::move(drops).Take();
   std::ranges::move(std::move(puts).Take(), std::back_inserter(statements));
   return statements;
+}
+
+std::vector<Statement> ListChanges(std::span<const Change* const> changes, uint64_t batch) {
+  struct Row {
+    uint64_t revision = 0;
+    uint64_t ended_at = 0;
+    uint64_t began = 0;
+    bool was_body = false;
+  };
+  std::map<std::string, Row> rows;
+  for (const Change* change : changes) {
+    Row& row = rows[change->id()];
+    row.revision = change->revision;
+    const uint64_t began = BeganOfEnded(*change);
+    if (began != 0 || change->deleted) row.ended_at = row.revision;
+    if (row.began == 0) row.was_body = change->body != nullptr;
+    if (row.began == 0) row.began = began;
+  }
+  Encoder list;
+  for (const auto& [id, row] : rows) {
+    list.Add("hulld_put_changes",
+             {Bigint(batch), Text(id), Bigint(row.revision), Bigint(row.ended_at),
+              Bigint(row.was_body ? 0 : row.began), Bigint(row.was_body ? row.began : 0)});
+  }
+  return std::move(list).Take();
 }
 
 }  // namespace hulld::server

@@ -1,6 +1,7 @@
 #ifndef HULLD_SERVER_STORE_POSTGRES_BATCH_STATEMENTS_H_
 #define HULLD_SERVER_STORE_POSTGRES_BATCH_STATEMENTS_H_
 
+#include <cstdint>
 #include <span>
 #include <string>
 #include <vector>
@@ -17,6 +18,10 @@ std::string PrepareBatchStatements();
 // first, then inserts, with each row written once, regardless of the number of changes to a hull.
 // Cost: O(bytes of the remaining vertices).
 std::vector<Statement> StatementsOf(std::span<const Change* const> changes);
+
+// Statements that list the changes of a batch for peer servers: hulld_put_changes, which sessions
+// of a shared store prepare.
+std::vector<Statement> ListChanges(std::span<const Change* const> changes, uint64_t batch);
 
 // Change of the store's totals by a batch, modulo 2^64. The vertices of a hull that ended with a
 // damaged record stay counted.

@@ -4,7 +4,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <map>
+#include <iterator>
 #include <utility>
 
 #include "core/base/status_macros.h"
@@ -75,9 +75,9 @@ constexpr char kPrepareShared[] = R"(
         SELECT epoch, $1, batch, revision FROM joined ON CONFLICT (epoch) DO NOTHING)
       SELECT epoch, batch, revision, store_id, hulls, vertices, bodies, relaxed FROM joined;
     PREPARE hulld_turn AS SELECT batch FROM hulld.store FOR UPDATE;
-    PREPARE hulld_put_changes(bigint, text[], bigint[], bigint[], bigint[], bigint[]) AS
+    PREPARE hulld_put_changes(bigint[], text[], bigint[], bigint[], bigint[], bigint[]) AS
       INSERT INTO hulld.changes (batch, id, revision, ended_at, began, body_began)
-      SELECT $1, * FROM unnest($2, $3, $4, $5, $6);
+      SELECT * FROM unnest($1, $2, $3, $4, $5, $6);
     PREPARE hulld_put_server(text, bigint) AS
       INSERT INTO hulld.servers (owner, batch) VALUES ($1, $2)
       ON CONFLICT (owner) DO UPDATE SET batch = excluded.batch, seen = now();
@@ -94,50 +94,6 @@ constexpr char kPrepareShared[] = R"(
 Statement FetchStatement(uint64_t batch) {
   return {.name = "hulld_follow",
           .parameters = {EncodeBigint(batch), EncodeBigint(kMaxFollowed + 1)}};
-}
-
-// Returns the create_revision of the incarnation that a change ends; 0: none. It is unknown for a
-// damaged hull; the value 1 then records that the hull existed, which peer servers need to know.
-uint64_t BeganOfEnded(const Change& change) {
-  const auto known = [](uint64_t revision) { return std::max<uint64_t>(revision, 1); };
-  if (change.replaced.has_value()) return known(change.replaced->record.create_revision);
-  if (!change.deleted) return 0;
-  return known(change.body != nullptr ? change.body->record.create_revision
-                                      : change.hull.record.create_revision);
-}
-
-// Returns the statement that lists a batch's changes for peer servers.
-Statement ChangesRow(std::span<Change* const> changes, uint64_t batch) {
-  struct Row {
-    uint64_t revision = 0;
-    uint64_t ended_at = 0;
-    uint64_t began = 0;
-    bool was_body = false;
-  };
-  std::map<std::string, Row> rows;
-  for (const Change* change : changes) {
-    Row& row = rows[change->id()];
-    row.revision = change->revision;
-    const uint64_t began = BeganOfEnded(*change);
-    if (began != 0 || change->deleted) row.ended_at = row.revision;
-    if (row.began == 0) row.was_body = change->body != nullptr;
-    if (row.began == 0) row.began = began;
-  }
-  ArrayParameter ids(ArrayParameter::Element::kText);
-  ArrayParameter revisions(ArrayParameter::Element::kBigint);
-  ArrayParameter ends(ArrayParameter::Element::kBigint);
-  ArrayParameter began(ArrayParameter::Element::kBigint);
-  ArrayParameter bodies_began(ArrayParameter::Element::kBigint);
-  for (const auto& [id, row] : rows) {
-    ids.Add(id);
-    revisions.Add(EncodeBigint(row.revision));
-    ends.Add(EncodeBigint(row.ended_at));
-    began.Add(EncodeBigint(row.was_body ? 0 : row.began));
-    bodies_began.Add(EncodeBigint(row.was_body ? row.began : 0));
-  }
-  return {.name = "hulld_put_changes",
-          .parameters = {EncodeBigint(batch), ids.Take(), revisions.Take(), ends.Take(),
-                         began.Take(), bodies_began.Take()}};
 }
 
 // Records the first incarnation that ended. rows: the result of hulld_follow.
@@ -281,19 +237,14 @@ absl::Status PostgresStore::Fetch() {
       "cannot read changes of peer servers from the database: ", rows.status().message()));
 }
 
-// Takes the turn before writing a batch, and reads the preceding changes by peer servers.
-absl::Status PostgresStore::TakeTurn() {
-  const Statement turn[] = {{.text = "BEGIN"}, {.name = "hulld_turn"}, FetchStatement(batch_)};
-  const absl::StatusOr<std::vector<Rows>> rows = writer_->Ask(turn);
-  return rows.ok() ? NotePeerChanges(rows->back()) : rows.status();
-}
-
 // Runs one transaction in two round trips. The first takes the turn, which lasts until the end of
 // the transaction: batches are serialized, and all earlier commits of peer servers are known. So
 // the new revisions are the next ones, and no server reads a batch before its predecessor. batch:
 // the batch that may have been committed if the session is lost.
 absl::Status PostgresStore::AttemptShared(std::span<Change* const> changes, Batch* batch) {
-  absl::Status status = TakeTurn();
+  const Statement turn[] = {{.text = "BEGIN"}, {.name = "hulld_turn"}, FetchStatement(batch_)};
+  const absl::StatusOr<std::vector<Rows>> before = writer_->Ask(turn);
+  const absl::Status status = before.ok() ? NotePeerChanges(before->back()) : before.status();
   std::vector<Change*> kept;
   for (Change* change : changes) {
     if (!peer_changes_.by_id.contains(change->id())) kept.push_back(change);
@@ -301,7 +252,7 @@ absl::Status PostgresStore::AttemptShared(std::span<Change* const> changes, Batc
   if (status.ok() && !kept.empty()) {
     const Batch next = {batch_ + 1, NumberChanges(kept, revision_), AddedBy(kept)};
     std::vector<Statement> statements = StatementsOf(kept);
-    statements.push_back(ChangesRow(kept, next.number));
+    std::ranges::move(ListChanges(kept, next.number), std::back_inserter(statements));
     statements.push_back(
         {.name = "hulld_put_server", .parameters = {owner_, EncodeBigint(next.number)}});
     if (next.number % kBatchesPerPruning == 0 && next.number > kKeptBatches) {

@@ -217,7 +217,6 @@ class PostgresStore : public Store, public PeerFeed {
   absl::Status CheckStore(const Rows& rows);
   void GiveNewId();
   absl::Status NotePeerChanges(const Rows& rows);
-  absl::Status TakeTurn();
   absl::Status AttemptShared(std::span<Change* const> changes, Batch* batch);
   absl::StatusOr<bool> SharedOutcome(uint64_t batch);
   absl::Status EndStuckTurns();
