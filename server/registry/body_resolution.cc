@@ -41,9 +41,8 @@ absl::Status WhyNoPiece(const Body& body, size_t hull, const absl::Status& cause
                     {{"body_id", body_id}, {"piece", uint64_t{piece}}, {"hull_id", hull_id}});
 }
 
-// Returns the resolved hull of an ID.
-using FindHull = std::function<const absl::StatusOr<HullView>&(const std::string&)>;
-
+// find_hull: returns the resolved hull of an ID.
+template <typename FindHull>
 absl::StatusOr<HullView> ServeBody(Registry& registry, const std::shared_ptr<const Body>& body,
                                    const PlacedLookup& lookup, const FindHull& find_hull) {
   if (!body->damage().ok()) return body->damage();
@@ -250,7 +249,7 @@ absl::StatusOr<Resolved> RefreshPlaced(Registry& registry, std::span<const std::
     add_shapes(hulls->hulls);
     return hulls;
   }
-  const FindHull find_hull = [&](const std::string& id) -> const absl::StatusOr<HullView>& {
+  const auto find_hull = [&](const std::string& id) -> const absl::StatusOr<HullView>& {
     return hulls->hulls[known.index_of_.at(id)];
   };
   Resolved resolved = {.as_of = hulls->as_of};

@@ -3,6 +3,8 @@
 
 #include <absl/status/status.h>
 
+#include "core/base/check.h"
+
 namespace hulld::server {
 
 // State machine of a hull in the registry. Each transition checks that it is legal; an illegal
@@ -79,31 +81,76 @@ class HullState {
   }
 
   // Requests a thread for the next chunk.
-  void Schedule();
+  void Schedule() {
+    HULLD_CHECK(can_schedule());
+    work_ = Work::kScheduled;
+  }
   // Transfers the builder to the scheduled thread.
-  void StartBuilding();
+  void StartBuilding() {
+    HULLD_CHECK(work_ == Work::kScheduled);
+    HULLD_CHECK(life_ == Life::kPresent && !damaged());
+    work_ = Work::kBuilding;
+  }
   // Counts the chunk being built as in flight.
-  void Submit();
+  void Submit() {
+    HULLD_CHECK(work_ == Work::kBuilding);
+    HULLD_CHECK(life_ == Life::kPresent && !damaged() && in_flight_ < kMaxInFlight);
+    ++in_flight_;
+  }
   // Ends the work of the scheduled or building thread, which has returned the builder if it owned
   // it.
-  void EndWork();
+  void EndWork() {
+    HULLD_CHECK(work_ != Work::kIdle);
+    work_ = Work::kIdle;
+  }
 
   // Submits a deletion or a replacement.
-  void StartEnding();
+  void StartEnding() {
+    HULLD_CHECK(life_ == Life::kPresent && quiet());
+    life_ = Life::kEnding;
+    in_flight_ = 1;
+  }
   // Commits or refuses the oldest change in flight.
   void Commit() { Settle(true); }
   void Refuse() { Settle(false); }
 
   // A peer server changed or ended the hull. Requires: the hull is present, with nothing in flight.
-  void Supersede();
-  void Vanish();
+  void Supersede() {
+    HULLD_CHECK(life_ == Life::kPresent && in_flight_ == 0);
+    if (work_ == Work::kBuilding) work_ = Work::kReverting;
+  }
+  void Vanish() {
+    Supersede();
+    life_ = Life::kGone;
+  }
 
   // Records that the store cannot read the hull back. Requires: `damage` is not OK.
-  void Damage(const absl::Status& damage);
+  void Damage(const absl::Status& damage) {
+    HULLD_CHECK(life_ == Life::kPresent && !damaged());
+    HULLD_CHECK(!damage.ok());
+    damage_ = damage;
+  }
 
  private:
   HullState(Life life, int in_flight) : life_(life), in_flight_(in_flight) {}
-  void Settle(bool is_committed);
+  void Settle(bool is_committed) {
+    HULLD_CHECK(in_flight_ > 0);
+    --in_flight_;
+    switch (life_) {
+      case Life::kCreating:
+        life_ = is_committed ? Life::kPresent : Life::kGone;
+        return;
+      case Life::kPresent:
+        if (!is_committed && work_ == Work::kBuilding) work_ = Work::kReverting;
+        return;
+      case Life::kEnding:
+        life_ = is_committed ? Life::kGone : Life::kPresent;
+        return;
+      case Life::kGone:
+        break;
+    }
+    HULLD_UNREACHABLE();  // nothing in flight
+  }
 
   Life life_;
   Work work_ = Work::kIdle;

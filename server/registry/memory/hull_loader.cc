@@ -30,16 +30,12 @@ constexpr size_t kMinSteps = 8;
 // Loading this many small hulls takes longer than waking a thread.
 constexpr size_t kWorthAThread = 8;
 
-uint64_t PointCount(const StoredHull& stored) {
-  return stored.layout.base_vertices + stored.layout.delta_vertices;
-}
-
 // points: the hull's points as read from the store.
 absl::StatusOr<std::shared_ptr<LiveHull>> MakeLive(const StoredHull& stored,
                                                    absl::StatusOr<std::vector<Vector>> points) {
   if (!points.ok()) return points.status();
   const std::string& id = stored.record.hull_id;
-  const uint64_t expected = PointCount(stored);
+  const uint64_t expected = stored.layout.base_vertices + stored.layout.delta_vertices;
   if (points->size() != expected || expected < stored.record.vertex_count) {
     return DamagedHull(
         id, absl::StrCat("it has ", points->size(), " of ", expected,

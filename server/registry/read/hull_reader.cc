@@ -173,8 +173,7 @@ absl::Status HullReader::AwaitRecord(Locked& locked, const HullsRead& read, uint
   for (const uint32_t due : std::span(hulls.due_).last(count)) {
     if (due != k) wanted.push_back(&read.ids[hulls.hulls_[due].first]);
   }
-  const absl::Status asked = records_.AwaitKnown(locked, wanted, read.should_stop);
-  return Stopped(read.should_stop) ? Cancelled() : asked;
+  return records_.AwaitKnown(locked, wanted, read.should_stop);
 }
 
 // Returns true if this reader already has the committed state of the hull.

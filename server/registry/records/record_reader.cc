@@ -108,10 +108,11 @@ absl::Status RecordReader::AwaitKnown(Locked& locked, std::span<const std::strin
     if (is_new) own.push_back(reading);
     if (awaited == nullptr) awaited = reading;
   }
-  return locked.AwaitCall(should_stop, [&](const auto& done) {
+  const absl::Status read = locked.AwaitCall(should_stop, [&](const auto& done) {
     awaited->waiting.push_back(done);
     if (!own.empty()) ReadRecords(locked, own);
   });
+  return Stopped(should_stop) ? Cancelled() : read;
 }
 
 // As AwaitKnown for the unknown ones among `ids`, which must include the first.
@@ -123,9 +124,7 @@ absl::Status RecordReader::AwaitMissing(Locked& locked, std::span<const std::str
   for (const std::string& id : ids) {
     if (!state_.IsKnown(id)) missing.push_back(&id);
   }
-  const absl::Status read = AwaitKnown(locked, missing, should_stop);
-  if (Stopped(should_stop)) return Cancelled();
-  return read;
+  return AwaitKnown(locked, missing, should_stop);
 }
 
 // Looks up kMaxLookupsPerHold bodies per hold and reads the unknown ones together. A reader of
