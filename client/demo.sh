@@ -106,11 +106,11 @@ register() {
     "$(field edges <"$work/hull")" "$(field facets <"$work/hull")" "$(field audit <"$work/hull")"
 }
 
-# ask WANT QUESTION A B OPTION...: checks the pair by both methods.
+# ask WANT QUERY A B OPTION...: checks the pair by both methods.
 ask() {
-  local want=$1 question=$2 flag
+  local want=$1 query=$2 flag
   shift 2
-  printf '\n  %s\n' "$question"
+  printf '\n  %s\n' "$query"
   for flag in "" --textbook; do
     ctl check "$@" --axis --report $flag >"$work/answer"
     awk -F '  +' '{ value[$1] = $2 }

@@ -76,10 +76,10 @@ HealthService::Status HealthService::StatusOf(const std::string& service) const 
 
 UnaryReactor* HealthService::Check(CallContext* context, const Bytes* request, Bytes* response) {
   UnaryReactor* const reactor = context->DefaultReactor();
-  HealthCheckRequest question;
+  HealthCheckRequest message;
   RequestMemory::Share share;
   Bytes bytes = TakenFrom(*request);
-  const absl::Status parsed = ParseRequest(bytes, admission_.request_memory(), &question, share);
+  const absl::Status parsed = ParseRequest(bytes, admission_.request_memory(), &message, share);
   if (!parsed.ok()) {
     reactor->Finish(ToGrpc(parsed));
     return reactor;
@@ -87,7 +87,7 @@ UnaryReactor* HealthService::Check(CallContext* context, const Bytes* request, B
   Status status;
   {
     const std::lock_guard lock(mutex_);
-    status = StatusOf(question.service());
+    status = StatusOf(message.service());
   }
   if (status == HealthCheckResponse::UNKNOWN) {
     reactor->Finish({grpc::StatusCode::NOT_FOUND, "the server has no service of this name"});

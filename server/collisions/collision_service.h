@@ -11,7 +11,7 @@ namespace hulld::server {
 
 // hulld.v1.CollisionService: implements the contract in collision.proto with the queries of core. A
 // single pair is answered on arrival, on gRPC's thread, if only its relation is wanted and its
-// hulls are ready and of moderate size (pair_question.cc). Everything else runs on `pool`: single
+// hulls are ready and of moderate size (pair_query.cc). Everything else runs on `pool`: single
 // pairs and short steps of streams before slices of batches, scenes, and long steps. Work that may
 // wait for the store, or that builds canonical snapshots, runs on `readers` (for the hulls of one
 // pair) or `long_readers` (for many hulls). TEXTBOOK_SAT pairs are answered in slices that

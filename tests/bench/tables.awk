@@ -212,7 +212,7 @@ function relation(   s, p, r, key, text, n) {
       for (r = 1; r <= 5; r++) {
         key = sets[s] " " regimes[r] SUBSEP peers[p]
         text = text (r > 1 ? " / " : "") short(cell[key, "ns"])
-        if (cell[key, "wrong"] > 0) text = text " (" share(cell[key, "wrong"], cell[key, "questions"]) " wrong)"
+        if (cell[key, "wrong"] > 0) text = text " (" share(cell[key, "wrong"], cell[key, "queries"]) " wrong)"
       }
       printf " %s |", p == 1 ? "**" text "**" : text
     }
@@ -232,7 +232,7 @@ function touching(   s, p, n, key) {
     printf "| %s |", set_name(sets[s])
     for (p = 1; p <= n; p++) {
       key = sets[s] " contact" SUBSEP peers[p]
-      printf " %s (%s) |", short(cell[key, "ns"]), share(cell[key, "wrong"], cell[key, "questions"])
+      printf " %s (%s) |", short(cell[key, "ns"]), share(cell[key, "wrong"], cell[key, "queries"])
     }
     print ""
   }
@@ -242,10 +242,10 @@ function touching(   s, p, n, key) {
 # Returns percent of all, or "0".
 function share(part, all) { return part == 0 ? "0" : sprintf("%.2g %%", 100 * part / all) }
 
-function lengths(question,   s, p, n, m, key) {
-  read_rows("query_" question "_" machine)
+function lengths(query,   s, p, n, m, key) {
+  read_rows("query_" query "_" machine)
   head("| hulls | hulld | FCL, libccd | FCL, own | libccd GJK | Bullet |")
-  m = split(question == "contact" ? "sphere:64 deep,sphere:512 deep,ur5 graze,ur5 deep" \
+  m = split(query == "contact" ? "sphere:64 deep,sphere:512 deep,ur5 graze,ur5 deep" \
                                   : "sphere:64 close,sphere:512 close,ur5 far,ur5 close,ur5 gap", sets, ",")
   n = split("hulld,FCL libccd,FCL indep,libccd GJK,Bullet", peers, ",")
   for (s = 1; s <= m; s++) {
@@ -318,7 +318,7 @@ function first_contact_faults(   i, k, m, n, key, part, kinds, methods, missed, 
     key = order[i]
     split(key, part, /:|\034/)
     m = part[1] SUBSEP part[3]
-    asked[m] += cell[key, "questions"]
+    asked[m] += cell[key, "queries"]
     missed[m] += cell[key, "missed"]
     invented[m] += cell[key, "false_contacts"]
     if (cell[key, "time_error"] + 0 > error[m]) error[m] = cell[key, "time_error"] + 0
@@ -382,7 +382,7 @@ function accuracy(   i, key) {
     printf "| %s | %s | %s | %s | %s |\n", named(key), cell[key, "wrong"], cell[key, "open"], cell[key, "missed_collisions"],
            cell[key, "invented_collisions"]
   }
-  printf "\n*Counts of %s questions, the same on every machine; rows in %s.*\n", cell[key, "questions"], files
+  printf "\n*Counts of %s queries, the same on every machine; rows in %s.*\n", cell[key, "queries"], files
 }
 
 function trade(   i, key) {
@@ -470,7 +470,7 @@ function live(   fields, key, order_of, i, n, part) {
 
 # Three sizes only; omits queries about another hull.
 function live_service(   fields, reader) {
-  head("| vertices | question | p50 | p99 | p50 / at rest | p99 / at rest | chunks of the writer |")
+  head("| vertices | query | p50 | p99 | p50 / at rest | p99 / at rest | chunks of the writer |")
   while (next_row("server_live_" machine, fields)) {
     if (fields[1] !~ /^(64|10000|1000000)$/ || fields[2] ~ /^another/) continue
     reader = fields[4] != ""
@@ -508,13 +508,13 @@ function pair(what, set,   peers, n, i, best) {
     if (best == "" || cell[set, peers[i], "ns"] + 0 < cell[set, best, "ns"] + 0) best = peers[i]
   }
   compare(what, cell[set, "hulld", "ns"], named(best), cell[set, best, "ns"],
-          share(cell[set, "hulld", "wrong"], cell[set, "hulld", "questions"]) " / " \
-          share(cell[set, best, "wrong"], cell[set, best, "questions"]))
+          share(cell[set, "hulld", "wrong"], cell[set, "hulld", "queries"]) " / " \
+          share(cell[set, best, "wrong"], cell[set, best, "queries"]))
 }
 # One point and one query of a growing hull.
 function grown(vertices,   fields, step) {
   while (next_row("query_live_" machine, fields)) {
-    if (fields[1] == "1 point, 1 question" && fields[3] == vertices) step[fields[2]] = 1000 * fields[4]
+    if (fields[1] == "1 point, 1 query" && fields[3] == vertices) step[fields[2]] = 1000 * fields[4]
   }
   compare("add a point, then query, hull of " vertices, step["hulld"], "Bullet", step["Bullet"], "-")
 }
@@ -527,7 +527,7 @@ function store_name(row) {
   sub(/^many/, "many servers", row)
   sub(/^libpq as one$/, "libpq alone, as one server", row)
   sub(/^libpq as many$/, "libpq alone, as many servers", row)
-  sub(/^libpq question$/, "libpq alone, the question of LINEARIZABLE", row)
+  sub(/^libpq query$/, "libpq alone, the query of LINEARIZABLE", row)
   sub(/^gRPC and libpq as one$/, "gRPC alone, then libpq alone, as one", row)
   sub(/^gRPC and libpq as many$/, "gRPC alone, then libpq alone, as many", row)
   return row
@@ -549,9 +549,9 @@ function postgres_commit(   i, key, floor, both) {
   measured()
 }
 
-function postgres_questions(   i, key) {
-  read_rows("postgres/questions_" machine)
-  head("| a question | p50 | p99 | a second | CPU of hulld | of RocksDB | CPU of the database |")
+function postgres_queries(   i, key) {
+  read_rows("postgres/queries_" machine)
+  head("| a query | p50 | p99 | a second | CPU of hulld | of RocksDB | CPU of the database |")
   for (i = 1; i <= rows; i++) {
     key = order[i]
     printf "| %s | %s | %s | %d | %s | %s | %s |\n", store_name(key), micro(cell[key, "p50_us"]), micro(cell[key, "p99_us"]),
@@ -609,7 +609,7 @@ BEGIN {
   else if (table == "network") network()
   else if (table == "start") start()
   else if (table == "postgres-commit") postgres_commit()
-  else if (table == "postgres-questions") postgres_questions()
+  else if (table == "postgres-queries") postgres_queries()
   else if (table == "overload") overload()
   else if (table == "live") live()
   else if (table == "live-service") live_service()

@@ -331,10 +331,10 @@ AnswerFeed::~AnswerFeed() {
 void AnswerFeed::Show(const ViewScene& scene, uint64_t number) {
   const std::lock_guard lock(mutex_);
   scene_ = number;
-  question_ = Question();
-  question_.objects = scene.objects;
-  question_.rules = scene.rules;
-  question_.pairs = scene.pairs;
+  query_ = Query();
+  query_.objects = scene.objects;
+  query_.rules = scene.rules;
+  query_.pairs = scene.pairs;
   // The page sends a query after it receives the scene.
   asked_ = false;
 }
@@ -342,26 +342,25 @@ void AnswerFeed::Show(const ViewScene& scene, uint64_t number) {
 void AnswerFeed::AddObjects(const std::vector<ViewObject>& objects, uint64_t scene) {
   const std::lock_guard lock(mutex_);
   if (scene != scene_) return;
-  question_.objects.insert(question_.objects.end(), objects.begin(), objects.end());
+  query_.objects.insert(query_.objects.end(), objects.begin(), objects.end());
 }
 
-void AnswerFeed::Ask(const ViewQuestion& question) {
+void AnswerFeed::Ask(const ViewQuery& query) {
   {
     const std::lock_guard lock(mutex_);
-    if (question.scene != scene_) return;
-    for (size_t i = 0; i < question.objects.size(); ++i) {
-      if (question.objects[i] >= question_.objects.size()) continue;
-      question_.objects[question.objects[i]].pose = question.poses[i];
+    if (query.scene != scene_) return;
+    for (size_t i = 0; i < query.objects.size(); ++i) {
+      if (query.objects[i] >= query_.objects.size()) continue;
+      query_.objects[query.objects[i]].pose = query.poses[i];
     }
-    question_.pair = question.pair;
-    if (question.pair &&
-        std::max(question.pair->first, question.pair->second) >= question_.objects.size()) {
-      question_.pair.reset();
+    query_.pair = query.pair;
+    if (query.pair && std::max(query.pair->first, query.pair->second) >= query_.objects.size()) {
+      query_.pair.reset();
     }
-    question_.tolerance = question.tolerance;
-    question_.certificate = question.certificate;
-    question_.update = question.update;
-    question_.rest = question.rest;
+    query_.tolerance = query.tolerance;
+    query_.certificate = query.certificate;
+    query_.update = query.update;
+    query_.rest = query.rest;
     asked_ = true;
   }
   changed_.notify_all();
@@ -370,7 +369,7 @@ void AnswerFeed::Ask(const ViewQuestion& question) {
 void AnswerFeed::HullsChanged() {
   {
     const std::lock_guard lock(mutex_);
-    question_.motion_is_stale = true;
+    query_.motion_is_stale = true;
     asked_ = true;
   }
   changed_.notify_all();
@@ -378,70 +377,70 @@ void AnswerFeed::HullsChanged() {
 
 void AnswerFeed::Run() {
   while (true) {
-    Question question;
+    Query query;
     {
       std::unique_lock lock(mutex_);
       changed_.wait(lock, [this] { return asked_ || ended_; });
       if (ended_) return;
-      question = question_;
+      query = query_;
       asked_ = false;
-      question_.motion_is_stale = false;
+      query_.motion_is_stale = false;
     }
-    if (question.pair && !AnswerPair(question)) return;
-    if (!AnswerMotion(question)) return;
-    if (!question.rest && question.objects.size() > kMaxObjectsInMotion) continue;
-    if (!AnswerScene(question)) return;
+    if (query.pair && !AnswerPair(query)) return;
+    if (!AnswerMotion(query)) return;
+    if (!query.rest && query.objects.size() > kMaxObjectsInMotion) continue;
+    if (!AnswerScene(query)) return;
   }
 }
 
-bool AnswerFeed::AnswerPair(const Question& question) {
-  const auto& [a, b] = *question.pair;
-  if (question.objects[a].hull_id.empty() || question.objects[b].hull_id.empty()) return true;
-  const auto answer = question.rest ? RestingAnswer(question) : MovingAnswer(question);
+bool AnswerFeed::AnswerPair(const Query& query) {
+  const auto& [a, b] = *query.pair;
+  if (query.objects[a].hull_id.empty() || query.objects[b].hull_id.empty()) return true;
+  const auto answer = query.rest ? RestingAnswer(query) : MovingAnswer(query);
   if (answer.ok()) return page_->SendText(*answer);
   stream_.reset();
-  return page_->SendText(ProblemOfPair("answer", *question.pair, question.update, answer.status()));
+  return page_->SendText(ProblemOfPair("answer", *query.pair, query.update, answer.status()));
 }
 
-absl::StatusOr<std::string> AnswerFeed::RestingAnswer(const Question& question) const {
-  const ViewObject& a = question.objects[question.pair->first];
-  const ViewObject& b = question.objects[question.pair->second];
+absl::StatusOr<std::string> AnswerFeed::RestingAnswer(const Query& query) const {
+  const ViewObject& a = query.objects[query.pair->first];
+  const ViewObject& b = query.objects[query.pair->second];
   HULLD_ASSIGN_OR_RETURN(const auto response,
-                         client_.CheckCollision(PairRequest(a, b, question.certificate)));
-  if (question.tolerance == 0) {
-    return PairAnswerJson(*question.pair, a, b, question.update, response);
+                         client_.CheckCollision(PairRequest(a, b, query.certificate)));
+  if (query.tolerance == 0) {
+    return PairAnswerJson(*query.pair, a, b, query.update, response);
   }
-  HULLD_ASSIGN_OR_RETURN(const auto tolerant, TolerantAnswer(question));
-  return PairAnswerJson(*question.pair, a, b, question.update, response, tolerant);
+  HULLD_ASSIGN_OR_RETURN(const auto tolerant, TolerantAnswer(query));
+  return PairAnswerJson(*query.pair, a, b, query.update, response, tolerant);
 }
 
-absl::StatusOr<std::string> AnswerFeed::TolerantAnswer(const Question& question) const {
+absl::StatusOr<std::string> AnswerFeed::TolerantAnswer(const Query& query) const {
   v1::CheckCollisionRequest request =
-      PairRequest(question.objects[question.pair->first], question.objects[question.pair->second],
+      PairRequest(query.objects[query.pair->first], query.objects[query.pair->second],
                   /*certificate=*/false);
   // A tolerance excludes wanted fields.
   request.clear_wanted();
-  request.set_tolerance(question.tolerance);
+  request.set_tolerance(query.tolerance);
   HULLD_ASSIGN_OR_RETURN(const auto response, client_.CheckCollision(request));
   return JsonObject()
-      .AddJson("tolerance", NumbersJson(&question.tolerance, 1))
+      .AddJson("tolerance", NumbersJson(&query.tolerance, 1))
       .Add("relation", v1::Relation_Name(response.relation()))
       .Add("rung", v1::Rung_Name(response.rung()))
       .Close();
 }
 
-absl::StatusOr<std::string> AnswerFeed::MovingAnswer(const Question& question) {
-  const ViewObject& a = question.objects[question.pair->first];
-  const ViewObject& b = question.objects[question.pair->second];
+absl::StatusOr<std::string> AnswerFeed::MovingAnswer(const Query& query) {
+  const ViewObject& a = query.objects[query.pair->first];
+  const ViewObject& b = query.objects[query.pair->second];
   const std::pair<std::string, std::string> hulls(a.hull_id, b.hull_id);
   absl::StatusOr<v1::StreamCollisionsResponse> response;
   if (stream_ == nullptr || hulls != streamed_hulls_ ||
-      question.certificate != streamed_certificate_) {
+      query.certificate != streamed_certificate_) {
     stream_ = client_.OpenCollisionStream();
     streamed_hulls_ = hulls;
-    streamed_certificate_ = question.certificate;
+    streamed_certificate_ = query.certificate;
     v1::CollisionStreamOpen open;
-    const v1::CheckCollisionRequest request = PairRequest(a, b, question.certificate);
+    const v1::CheckCollisionRequest request = PairRequest(a, b, query.certificate);
     *open.add_placements() = request.a();
     *open.add_placements() = request.b();
     open.add_pairs(0);
@@ -473,30 +472,30 @@ absl::StatusOr<std::string> AnswerFeed::MovingAnswer(const Question& question) {
   if (columns.pair_problems_size() > 0) {
     return absl::InternalError(columns.pair_problems(0).message());
   }
-  return AnswerMessage(*question.pair, a, b, question.update, /*rest=*/false, streamed_version_a_,
+  return AnswerMessage(*query.pair, a, b, query.update, /*rest=*/false, streamed_version_a_,
                        streamed_version_b_, RowAt(columns, 0));
 }
 
-bool AnswerFeed::AnswerMotion(const Question& question) {
-  if (!question.pair) {
+bool AnswerFeed::AnswerMotion(const Query& query) {
+  if (!query.pair) {
     asked_motion_.clear();
     return true;
   }
-  const ViewObject& a = question.objects[question.pair->first];
-  const ViewObject& b = question.objects[question.pair->second];
-  const auto request = MotionRequest(a, b, question.certificate);
+  const ViewObject& a = query.objects[query.pair->first];
+  const ViewObject& b = query.objects[query.pair->second];
+  const auto request = MotionRequest(a, b, query.certificate);
   std::string asked =
-      request ? absl::StrCat(PairJson(*question.pair), request->SerializeAsString()) : "";
-  const bool is_known = asked == asked_motion_ && !question.motion_is_stale;
+      request ? absl::StrCat(PairJson(*query.pair), request->SerializeAsString()) : "";
+  const bool is_known = asked == asked_motion_ && !query.motion_is_stale;
   asked_motion_ = std::move(asked);
   if (!request || is_known) return true;
   return page_->SendText(
-      MotionAnswerJson(*question.pair, a, b, question.update, client_.CheckCollision(*request)));
+      MotionAnswerJson(*query.pair, a, b, query.update, client_.CheckCollision(*request)));
 }
 
-bool AnswerFeed::AnswerScene(const Question& question) const {
-  const auto answer = SceneAnswerJson(client_, question.rules, question.pairs, question.objects,
-                                      question.tolerance, question.update);
+bool AnswerFeed::AnswerScene(const Query& query) const {
+  const auto answer = SceneAnswerJson(client_, query.rules, query.pairs, query.objects,
+                                      query.tolerance, query.update);
   if (answer.ok()) return page_->SendText(*answer);
   return page_->SendText(ProblemMessage(
       absl::StrCat("Cannot determine the colliding pairs: ", answer.status().message())));

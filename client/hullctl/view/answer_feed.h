@@ -30,13 +30,13 @@ class AnswerFeed {
   // Ignored if they belong to another scene.
   void AddObjects(const std::vector<ViewObject>& objects, uint64_t scene);
   // Ignored if it belongs to another scene.
-  void Ask(const ViewQuestion& question);
+  void Ask(const ViewQuery& query);
   // Answers the last query again because a hull changed.
   void HullsChanged();
 
  private:
-  // The complete question.
-  struct Question {
+  // The complete query.
+  struct Query {
     std::vector<ViewObject> objects;
     v1::FindCollisionsRequest rules;
     std::optional<std::vector<uint32_t>> pairs;
@@ -51,14 +51,14 @@ class AnswerFeed {
 
   void Run();
   // Sends the answer about the pair. Returns false if the page has closed.
-  bool AnswerPair(const Question& question);
-  absl::StatusOr<std::string> MovingAnswer(const Question& question);
-  absl::StatusOr<std::string> RestingAnswer(const Question& question) const;
+  bool AnswerPair(const Query& query);
+  absl::StatusOr<std::string> MovingAnswer(const Query& query);
+  absl::StatusOr<std::string> RestingAnswer(const Query& query) const;
   // Returns the pair's answer with the tolerance, as JSON.
-  absl::StatusOr<std::string> TolerantAnswer(const Question& question) const;
+  absl::StatusOr<std::string> TolerantAnswer(const Query& query) const;
   // Sends the first contact of the pair, if it moves, unless the page has it.
-  bool AnswerMotion(const Question& question);
-  bool AnswerScene(const Question& question) const;
+  bool AnswerMotion(const Query& query);
+  bool AnswerScene(const Query& query) const;
 
   const Client& client_;
   const std::shared_ptr<PageChannel> page_;
@@ -76,7 +76,7 @@ class AnswerFeed {
   std::mutex mutex_;
   std::condition_variable changed_;
   // Guarded by the mutex, like all members below.
-  Question question_;
+  Query query_;
   uint64_t scene_ = 0;
   bool asked_ = false;
   bool ended_ = false;

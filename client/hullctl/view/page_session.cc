@@ -77,7 +77,7 @@ void PageSession::OnMessage(std::string_view json) {
     WidenWatch(message->geometry);
     geometry_.Ask(message->geometry);
   }
-  if (message->question) answers_.Ask(*message->question);
+  if (message->query) answers_.Ask(*message->query);
   if (message->joints) MoveJoints(*message->joints);
   if (message->edit) Edit(*std::move(message->edit));
 }

@@ -86,28 +86,28 @@ class Reader {
   absl::Status status_;
 };
 
-ViewQuestion ReadQuestion(Reader* reader) {
-  ViewQuestion question;
-  question.scene = reader->Count("scene");
-  question.update = reader->Count("update");
-  question.objects = reader->Indices("objects");
+ViewQuery ReadQuery(Reader* reader) {
+  ViewQuery query;
+  query.scene = reader->Count("scene");
+  query.update = reader->Count("update");
+  query.objects = reader->Indices("objects");
   const ListValue& poses = reader->List("poses");
-  if (poses.values_size() != static_cast<int>(7 * question.objects.size())) {
+  if (poses.values_size() != static_cast<int>(7 * query.objects.size())) {
     reader->Complain("poses", "needs seven numbers for each entry of objects");
-    return question;
+    return query;
   }
-  question.poses.resize(question.objects.size());
+  query.poses.resize(query.objects.size());
   for (int i = 0; i < poses.values_size(); ++i) {
-    question.poses[static_cast<size_t>(i) / 7][static_cast<size_t>(i) % 7] =
+    query.poses[static_cast<size_t>(i) / 7][static_cast<size_t>(i) % 7] =
         poses.values(i).number_value();
   }
   const std::vector<uint32_t> pair = reader->Indices("pair");
-  if (pair.size() == 2 && pair[0] != pair[1]) question.pair.emplace(pair[0], pair[1]);
-  if (!pair.empty() && !question.pair) reader->Complain("pair", "does not name two objects");
-  question.tolerance = reader->Number("tolerance");
-  question.certificate = reader->Flag("certificate");
-  question.rest = reader->Flag("rest");
-  return question;
+  if (pair.size() == 2 && pair[0] != pair[1]) query.pair.emplace(pair[0], pair[1]);
+  if (!pair.empty() && !query.pair) reader->Complain("pair", "does not name two objects");
+  query.tolerance = reader->Number("tolerance");
+  query.certificate = reader->Flag("certificate");
+  query.rest = reader->Flag("rest");
+  return query;
 }
 
 std::vector<ShapeRequest> ReadGeometry(Reader* reader) {
@@ -210,8 +210,8 @@ absl::StatusOr<PageMessage> ParsePageMessage(std::string_view json) {
     message.geometry = ReadGeometry(&reader);
   } else if (type == "simplify") {
     message.geometry.push_back(ReadSimplification(&reader));
-  } else if (type == "question") {
-    message.question = ReadQuestion(&reader);
+  } else if (type == "query") {
+    message.query = ReadQuery(&reader);
   } else if (type == "edit") {
     message.edit = ReadEdit(&reader);
   } else if (type == "joints") {

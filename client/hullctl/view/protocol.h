@@ -27,11 +27,11 @@ namespace hulld {
 //   geometry   {hullIds, files}: requests hulls and bodies by ID and files by index; one frame
 //              answers each. From then on `hull` reports their changes, as for objects.
 //   simplify   {hullId, side: "inside"|"outside", maxError, maxVertices}: a frame answers it.
-//   question   {scene, update, objects, poses, time, pair, tolerance, certificate, rest}: for scene
+//   query   {scene, update, objects, poses, time, pair, tolerance, certificate, rest}: for scene
 //              number `scene`: new poses of some objects (seven numbers each, as in Pose), the time
 //              of these poses in a scene with motions, the pair to report in detail (two indices,
 //              or none), the scene's tolerance, true if the pair's certificate is wanted, and true
-//              if nothing moves now. A new question replaces the pending one and keeps its poses.
+//              if nothing moves now. A new query replaces the pending one and keeps its poses.
 //              `answer`, `motion`, and `collisions` answer it.
 //   edit       {action: "append"|"delete", hullId, points}: changes a hull; `points` are three
 //              numbers each. Refused unless `hello` permits it. `edited` answers it; pending edits
@@ -89,7 +89,7 @@ namespace hulld {
 // waypoint, or at several times of the motions, among them those of all first contacts.
 
 // A parsed message of the page.
-struct ViewQuestion {
+struct ViewQuery {
   uint64_t scene = 0;
   uint64_t update = 0;
   std::vector<uint32_t> objects;
@@ -119,7 +119,7 @@ struct ViewConfiguration {
 struct PageMessage {
   std::optional<std::string> show;
   std::vector<ShapeRequest> geometry;
-  std::optional<ViewQuestion> question;
+  std::optional<ViewQuery> query;
   std::optional<ViewEdit> edit;
   std::optional<ViewConfiguration> joints;
 };

@@ -14,7 +14,7 @@ from hulld.answers.bodies import Body, BodyInfo, ReplacedBody
 from hulld.answers.collisions import Batch, BatchPart, Collision, Method, Scene, ScenePart
 from hulld.answers.containment import (
     Containment,
-    PointQuestion,
+    PointQuery,
     collect,
     points_per_call,
     require_answers,
@@ -545,13 +545,13 @@ class Client(ClientBase):
         NotFoundError: no such hull.
         """
         array = as_points(points)
-        question = PointQuestion(as_placement((hull, pose)), orthogonality_tolerance)
+        query = PointQuery(as_placement((hull, pose)), orthogonality_tolerance)
         separation = separation or max_error is not None
         status = self.get_status(timeout=timeout)
         rows = points_per_call(status.limits)
         parts = []
         for first in range(0, len(array), rows):
-            packed, pairs = question.pairs(array[first : first + rows])
+            packed, pairs = query.pairs(array[first : first + rows])
             batch = self.check_collisions(
                 packed,
                 pairs,

@@ -313,7 +313,7 @@ def _booleans(values: Any, count: int) -> npt.NDArray[np.float64]:
     return booleans
 
 
-# --- Questions ---
+# --- Queries ---
 
 
 class _Asking:

@@ -14,7 +14,7 @@ constexpr size_t kFirstTailCapacity = 16;
 // Cost of preparing a point, in scanned points. Observed: 0.3 to 1 us against 0.3 to 1 ns.
 constexpr uint64_t kScansPerPrepared = 800;
 // Average number of directions per query.
-constexpr uint64_t kDirectionsPerQuestion = 6;
+constexpr uint64_t kDirectionsPerQuery = 6;
 // A new level absorbs preceding levels that are at most this many times larger.
 constexpr size_t kMergeRatio = 2;
 
@@ -187,15 +187,14 @@ std::vector<Vector> LiveHull::PointsAt(const Mark& mark) const {
   return PointsOf(*parts, mark.count_);
 }
 
-bool LiveHull::WantsPreparing(const Mark& mark, uint64_t more_questions) const {
+bool LiveHull::WantsPreparing(const Mark& mark, uint64_t more_queries) const {
   if (mark.count_ == 0) return false;
   const std::lock_guard lock(mutex_);
   const LiveParts& parts = *PartsFor(mark);
   const uint64_t scans =
       mark.count_ - parts.covered + (parts.base->prepared() ? 0 : parts.base->points().size());
   if (scans == 0) return false;
-  return scanned_->load(std::memory_order_relaxed) +
-             more_questions * kDirectionsPerQuestion * scans >=
+  return scanned_->load(std::memory_order_relaxed) + more_queries * kDirectionsPerQuery * scans >=
          kScansPerPrepared * scans;
 }
 

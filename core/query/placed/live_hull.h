@@ -77,8 +77,8 @@ class LiveHull {
   std::vector<Vector> PointsAt(const Mark& mark) const;
 
   // Returns true if queries have paid for preparing the points that they scan, assuming
-  // `more_questions` additional queries.
-  bool WantsPreparing(const Mark& mark, uint64_t more_questions = 0) const;
+  // `more_queries` additional queries.
+  bool WantsPreparing(const Mark& mark, uint64_t more_queries = 0) const;
   // Prepares the state up to `mark`; later versions use it. Appends and queries may run
   // concurrently. Cost: O(m log m) for the m points that it moves.
   void Prepare(const Mark& mark);

@@ -56,8 +56,8 @@ SupportPoint QueryHull::FartherInGrowth(const PlainVector& n, SupportPoint found
   if (growth_->scans > 0) {
     // Batches the updates because incrementing a counter shared by all threads is expensive.
     constexpr uint32_t kBetween = 16;
-    thread_local uint32_t questions = 0;
-    if (++questions % kBetween == 0) {
+    thread_local uint32_t queries = 0;
+    if (++queries % kBetween == 0) {
       growth_->scanned->fetch_add(kBetween * growth_->scans, std::memory_order_relaxed);
     }
   }

@@ -265,9 +265,9 @@ void RegisteredHull::EndLoading() {
   changed.notify_all();
 }
 
-bool RegisteredHull::WantsPreparing(uint64_t expected_questions) const {
+bool RegisteredHull::WantsPreparing(uint64_t expected_queries) const {
   return !is_preparing() && live() != nullptr && state.visible() &&
-         live()->WantsPreparing(committed_mark(), expected_questions);
+         live()->WantsPreparing(committed_mark(), expected_queries);
 }
 
 void RegisteredHull::NotePrepared(Locked& locked) {

@@ -164,7 +164,7 @@ class RegisteredHull {
   void StartLoading() { served_.is_loading = true; }
   void EndLoading();
   // True if past and expected queries pay for preparation, and no thread prepares the hull.
-  bool WantsPreparing(uint64_t expected_questions) const;
+  bool WantsPreparing(uint64_t expected_queries) const;
   // True if a thread prepares live(), or is about to.
   bool is_preparing() const { return served_.is_preparing; }
   void SetPreparing(bool prepares) { served_.is_preparing = prepares; }

@@ -62,7 +62,7 @@ struct AsOf {
 // A reader's intended use of the hulls that it requests.
 struct ReadPlan {
   // Expected number of queries on each hull's current version, if known.
-  uint64_t expected_questions = 0;
+  uint64_t expected_queries = 0;
   // If true, the reader waits for preparation that these queries pay for (LiveHull). Otherwise
   // another thread prepares the hull for later readers.
   bool prepare_first = false;

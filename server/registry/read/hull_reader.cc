@@ -141,7 +141,7 @@ absl::Status HullReader::LookUp(Locked& locked, const HullsRead& read, uint32_t 
       if (!loaded.ok() && !hull->state.gone()) return NoteFailure(loaded, known);
       continue;
     }
-    const bool prepare = hull->WantsPreparing(plan.expected_questions);
+    const bool prepare = hull->WantsPreparing(plan.expected_queries);
     if (prepare && plan.prepare_first) {
       if (!plan.may_wait) return WouldWait();
       if (!std::exchange(known.is_prepared, true)) {

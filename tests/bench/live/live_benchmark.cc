@@ -43,19 +43,19 @@ using Clock = std::chrono::steady_clock;
 struct Workload {
   const char* name;
   int points;
-  int questions;
+  int queries;
   bool inside = false;
   // Each step begins with the points alone, like a hull read from disk.
   bool cold = false;
 };
 constexpr Workload kWorkloads[] = {
-    {"1 point, 1 question", 1, 1},
-    {"30 points, 1 question", 30, 1},
-    {"1000 points, 1 question", 1000, 1},
-    {"1 point, 30 questions", 1, 30},
-    {"1 point, 1000 questions", 1, 1000},
-    {"1 inside point, 1 question", 1, 1, true},
-    {"first question, cold", 0, 1, false, true},
+    {"1 point, 1 query", 1, 1},
+    {"30 points, 1 query", 30, 1},
+    {"1000 points, 1 query", 1000, 1},
+    {"1 point, 30 queries", 1, 30},
+    {"1 point, 1000 queries", 1, 1000},
+    {"1 inside point, 1 query", 1, 1, true},
+    {"first query, cold", 0, 1, false, true},
 };
 constexpr int kProbeVertices = 64;
 constexpr double kProbeRadius = 1;
@@ -171,7 +171,7 @@ class Run {
     const auto begin = Clock::now();
     double peer_time = 0;
     std::vector<Vector> added(workload_.points);
-    std::vector<Pose> poses(workload_.questions);
+    std::vector<Pose> poses(workload_.queries);
     for (int step = 0; step < steps; ++step) {
       const double elapsed = Microseconds(Clock::now() - begin);
       if (elapsed > 1e6 * seconds_) break;

@@ -21,7 +21,7 @@ esac
 
 # Prints vertices and microseconds of a library: a column of its rows of a workload.
 series() {
-  sed -n 's/^"1 point, 1 question",/"1",/p' "$rows" |
+  sed -n 's/^"1 point, 1 query",/"1",/p' "$rows" |
     awk -F, -v library="$1" -v column="$2" '$2 == library { print $3, $column }'
   echo e
 }
@@ -37,7 +37,7 @@ set format x '10^{%T}'
 set format y '10^{%T}'
 set xlabel 'vertices'
 set ylabel 'microseconds'
-set title 'a point is added, then a question asked'
+set title 'a point is added, then a query asked'
 set grid lc rgb '#dddddd'
 set key top left Left reverse samplen 2 spacing 1.1
 set style line 1 lc rgb '#0b5394' lw 2.5 pt 7 ps 0.7

@@ -41,15 +41,14 @@ class BulletMotion final : public MotionMethod {
       shape->setMargin(0);
       shapes_.push_back(std::move(shape));
     }
-    for (const MotionSet::Question& question : set.questions) {
-      ends_.push_back(
-          {ToBullet(question.X_WA), ToBullet(question.X_WB.start), ToBullet(question.X_WB.end)});
+    for (const MotionSet::Query& query : set.queries) {
+      ends_.push_back({ToBullet(query.X_WA), ToBullet(query.X_WB.start), ToBullet(query.X_WB.end)});
     }
   }
 
-  Impact Find(size_t question) override {
-    const MotionSet::Question& asked = set_->questions[question];
-    const Ends& ends = ends_[question];
+  Impact Find(size_t query) override {
+    const MotionSet::Query& asked = set_->queries[query];
+    const Ends& ends = ends_[query];
     Method method(shapes_[asked.hull_a].get(), shapes_[asked.hull_b].get());
     btConvexCast::CastResult result;
     if (!method.cast.calcTimeOfImpact(ends.a, ends.a, ends.start, ends.end, result)) return {};

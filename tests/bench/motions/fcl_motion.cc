@@ -35,16 +35,16 @@ class FclMotion final : public MotionMethod {
       shapes_.push_back(ToFcl(hull));
       shapes_.back()->computeLocalAABB();
     }
-    for (const MotionSet::Question& question : set.questions) {
-      ends_.push_back({ToFcl(question.X_WA), ToFcl(question.X_WB.start), ToFcl(question.X_WB.end)});
+    for (const MotionSet::Query& query : set.queries) {
+      ends_.push_back({ToFcl(query.X_WA), ToFcl(query.X_WB.start), ToFcl(query.X_WB.end)});
     }
   }
 
-  Impact Find(size_t question) override {
-    const Ends& ends = ends_[question];
+  Impact Find(size_t query) override {
+    const Ends& ends = ends_[query];
     const fcl::TranslationMotion<double> at_rest(ends.a, ends.a);
-    if (turns_) return FindOn(question, at_rest, SteadyMotion(ends.start, ends.end));
-    return FindOn(question, at_rest, fcl::TranslationMotion<double>(ends.start, ends.end));
+    if (turns_) return FindOn(query, at_rest, SteadyMotion(ends.start, ends.end));
+    return FindOn(query, at_rest, fcl::TranslationMotion<double>(ends.start, ends.end));
   }
 
  private:
@@ -54,9 +54,8 @@ class FclMotion final : public MotionMethod {
     fcl::Transform3d end;
   };
 
-  Impact FindOn(size_t question, const fcl::MotionBase<double>& a,
-                const fcl::MotionBase<double>& b) {
-    const MotionSet::Question& asked = set_->questions[question];
+  Impact FindOn(size_t query, const fcl::MotionBase<double>& a, const fcl::MotionBase<double>& b) {
+    const MotionSet::Query& asked = set_->queries[query];
     fcl::ContinuousCollisionResultd result;
     fcl::continuousCollide<double>(shapes_[asked.hull_a].get(), &a, shapes_[asked.hull_b].get(), &b,
                                    request_, result);

@@ -3,14 +3,14 @@
 //   motion_benchmark --benchmark_enable_random_interleaving=true --benchmark_repetitions=5
 //       --benchmark_out=FILE.csv
 //
-// writes medians (CsvReporter). An iteration answers all motions of a set. Columns: `questions` in
+// writes medians (CsvReporter). An iteration answers all motions of a set. Columns: `queries` in
 // the set, `ns` per motion (processor time), and, compared with FindTruth on the method's own path:
 // `missed` contacts, `false_contacts`, motions left `open`, the largest `time_error` of a contact,
 // and its widest `bracket`.
 //
 // Rows "static:V gap" are hulld's static query of pairs 1e-6 apart, as many as motions in a set.
 // Rows "scene:1000" are all contacts of 1000 boxes that move and turn, and with "first" the first
-// contact alone (FindCollisions with first_only); questions are pairs whose boxes may meet.
+// contact alone (FindCollisions with first_only); queries are pairs whose boxes may meet.
 
 #include <benchmark/benchmark.h>
 
@@ -41,7 +41,7 @@ namespace {
 constexpr int kSizes[] = {8, 64, 512, 10000};
 
 // Fewer for large hulls, some of whose rows take milliseconds per motion.
-size_t QuestionsFor(int vertices) { return vertices > 5000 ? 32 : 128; }
+size_t QueriesFor(int vertices) { return vertices > 5000 ? 32 : 128; }
 
 std::shared_ptr<const QuerySet> HullsOf(int vertices) {
   static std::map<int, std::shared_ptr<const QuerySet>> sets;
@@ -60,8 +60,8 @@ class MotionWorkload {
       : vertices_(vertices), turns_(turns), passage_(passage) {}
 
   const MotionSet& motions() {
-    if (motions_.questions.empty()) {
-      motions_ = MakeMotionSet(HullsOf(vertices_), turns_, passage_, QuestionsFor(vertices_));
+    if (motions_.queries.empty()) {
+      motions_ = MakeMotionSet(HullsOf(vertices_), turns_, passage_, QueriesFor(vertices_));
     }
     return motions_;
   }
@@ -81,10 +81,10 @@ class MotionWorkload {
   std::map<Path, std::vector<MotionTruth>> truth_;
 };
 
-void ReportTimePer(benchmark::State& state, size_t questions) {
-  state.counters["questions"] = static_cast<double>(questions);
+void ReportTimePer(benchmark::State& state, size_t queries) {
+  state.counters["queries"] = static_cast<double>(queries);
   state.counters["ns"] = benchmark::Counter(
-      1e-9 * static_cast<double>(questions),
+      1e-9 * static_cast<double>(queries),
       benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
 }
 
@@ -119,7 +119,7 @@ void FindImpacts(benchmark::State& state, MotionWorkload& workload, MotionMethod
   const std::vector<MotionTruth>& truth = workload.truth(method.path());
   if (!prepared) method.Prepare(set);
   prepared = true;
-  std::vector<Impact> impacts(set.questions.size());
+  std::vector<Impact> impacts(set.queries.size());
   for (auto _ : state) {
     for (size_t i = 0; i < impacts.size(); ++i) impacts[i] = method.Find(i);
     benchmark::DoNotOptimize(impacts.data());
@@ -162,7 +162,7 @@ void RegisterStatic(int vertices) {
       [=](benchmark::State& state) {
         if (!subject->method) {
           subject->set = MakeQuerySet("sphere:" + std::to_string(vertices), Regime::kGap,
-                                      QuestionsFor(vertices));
+                                      QueriesFor(vertices));
           subject->method = MakeHulld();
           subject->method->Prepare(subject->set.hulls, subject->set.queries);
           subject->verdicts.resize(subject->set.queries.size());

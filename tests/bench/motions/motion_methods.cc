@@ -15,8 +15,8 @@ class HulldMotion final : public MotionMethod {
 
   void Prepare(const MotionSet& set) override { set_ = &set; }
 
-  Impact Find(size_t question) override {
-    const MotionSet::Question& asked = set_->questions[question];
+  Impact Find(size_t query) override {
+    const MotionSet::Query& asked = set_->queries[query];
     const QueryHull& a = set_->query_a(asked);
     const QueryHull& b = set_->query_b(asked);
     MotionOptions options;
@@ -45,14 +45,14 @@ class Sampling final : public MotionMethod {
   void Prepare(const MotionSet& set) override {
     set_ = &set;
     a_.clear();
-    for (const MotionSet::Question& question : set.questions) {
-      a_.push_back(*PlacedHull::Make(set.query_a(question), question.X_WA));
+    for (const MotionSet::Query& query : set.queries) {
+      a_.push_back(*PlacedHull::Make(set.query_a(query), query.X_WA));
     }
   }
 
-  Impact Find(size_t question) override {
-    const Motion& X_WB = set_->questions[question].X_WB;
-    const QueryHull& b = set_->query_b(set_->questions[question]);
+  Impact Find(size_t query) override {
+    const Motion& X_WB = set_->queries[query].X_WB;
+    const QueryHull& b = set_->query_b(set_->queries[query]);
     PairCache cache;
     for (int i = 0; i < poses_; ++i) {
       const double time = static_cast<double>(i) / (poses_ - 1);
@@ -60,7 +60,7 @@ class Sampling final : public MotionMethod {
       for (int k = 0; k < 4; ++k) X.q[k] = (1 - time) * X_WB.start.q[k] + time * X_WB.end.q[k];
       X.t = (1 - time) * X_WB.start.t + time * X_WB.end.t;
       const PlacedHull placed(b, X);
-      if (CheckCollision(a_[question], placed, {}, &cache)->relation != Relation::kSeparated) {
+      if (CheckCollision(a_[query], placed, {}, &cache)->relation != Relation::kSeparated) {
         return {Impact::Verdict::kMeets, time};
       }
     }

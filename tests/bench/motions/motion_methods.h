@@ -33,7 +33,7 @@ class MotionMethod {
   // Converts hulls and poses to the method's own types. The set must outlive its use.
   virtual void Prepare(const MotionSet& set) = 0;
   // Answers a motion of that set.
-  virtual Impact Find(size_t question) = 0;
+  virtual Impact Find(size_t query) = 0;
 
  private:
   std::string name_;

@@ -94,7 +94,7 @@ MotionSet MakeMotionSet(std::shared_ptr<const QuerySet> hulls, bool turns, Passa
     X_WB.end.t = X_WB.start.t + path;
     const double to_miss = ShiftToMiss(a, X_WA, b, X_WB, across, reach);
     const double shift = ShiftFor(passage, to_miss, reach, random);
-    set.questions.push_back({hull_a, hull_b, X_WA, Shifted(X_WB, shift * across)});
+    set.queries.push_back({hull_a, hull_b, X_WA, Shifted(X_WB, shift * across)});
   }
   return set;
 }

@@ -25,7 +25,7 @@ const char* Name(Passage passage);
 
 // Motions of a hull B past a hull A at rest. They are separated at both ends.
 struct MotionSet {
-  struct Question {
+  struct Query {
     size_t hull_a;
     size_t hull_b;
     Pose X_WA;
@@ -33,16 +33,12 @@ struct MotionSet {
   };
   // Only its hulls are used.
   std::shared_ptr<const QuerySet> hulls;
-  std::vector<Question> questions;
+  std::vector<Query> queries;
 
-  const Hull& a(const Question& question) const { return hulls->hulls[question.hull_a]; }
-  const Hull& b(const Question& question) const { return hulls->hulls[question.hull_b]; }
-  const QueryHull& query_a(const Question& question) const {
-    return hulls->query_hulls[question.hull_a];
-  }
-  const QueryHull& query_b(const Question& question) const {
-    return hulls->query_hulls[question.hull_b];
-  }
+  const Hull& a(const Query& query) const { return hulls->hulls[query.hull_a]; }
+  const Hull& b(const Query& query) const { return hulls->hulls[query.hull_b]; }
+  const QueryHull& query_a(const Query& query) const { return hulls->query_hulls[query.hull_a]; }
+  const QueryHull& query_b(const Query& query) const { return hulls->query_hulls[query.hull_b]; }
 };
 
 // Returns a rotation turned by 30 degrees about an axis.

@@ -29,25 +29,24 @@ std::span<const double> CoordinatesOf(const Hull& hull) {
   return {hull.vertices().front().data(), 3 * hull.vertices().size()};
 }
 
-MotionTruth ProvenTruth(const MotionSet& set, const MotionSet::Question& question) {
+MotionTruth ProvenTruth(const MotionSet& set, const MotionSet::Query& query) {
   MotionOptions options;
   options.want_certificate = true;
-  const FirstContact contact =
-      *FindFirstContact({set.query_a(question), {question.X_WA, question.X_WA}},
-                        {set.query_b(question), question.X_WB}, options);
+  const FirstContact contact = *FindFirstContact({set.query_a(query), {query.X_WA, query.X_WA}},
+                                                 {set.query_b(query), query.X_WB}, options);
   v1::FirstContact message;
   server::EncodeFirstContact(contact, &message);
   v1::Certificate certificate;
   if (contact.certificate) {
-    server::EncodeCertificate(*contact.certificate, set.a(question), set.b(question), &certificate);
+    server::EncodeCertificate(*contact.certificate, set.a(query), set.b(query), &certificate);
   }
-  const v1::Pose at_rest = ToMessage(question.X_WA);
-  const v1::Pose start = ToMessage(question.X_WB.start);
-  const v1::Pose end = ToMessage(question.X_WB.end);
+  const v1::Pose at_rest = ToMessage(query.X_WA);
+  const v1::Pose start = ToMessage(query.X_WB.start);
+  const v1::Pose end = ToMessage(query.X_WB.end);
   const absl::Status status =
       CheckFirstContact(server::EncodeRelation(contact.relation), message, certificate,
-                        {{CoordinatesOf(set.a(question)), at_rest}, at_rest},
-                        {{CoordinatesOf(set.b(question)), start}, end}, options.max_time_error);
+                        {{CoordinatesOf(set.a(query)), at_rest}, at_rest},
+                        {{CoordinatesOf(set.b(query)), start}, end}, options.max_time_error);
   if (!status.ok()) {
     std::fprintf(stderr, "motion_benchmark: a wrong certificate: %s\n", status.ToString().c_str());
     std::exit(1);
@@ -72,15 +71,14 @@ struct SteadyContact {
   double separated_until = 1;
   double contact_time = 1;
 };
-SteadyContact FindSteadyContact(const MotionSet& set, const MotionSet::Question& question,
+SteadyContact FindSteadyContact(const MotionSet& set, const MotionSet::Query& query,
                                 double radius) {
   for (int piece = 0; piece < kPieces; ++piece) {
     const auto whole_time = [&](double time) { return (piece + time) / kPieces; };
-    const Motion X_WB = {SteadyPose(question.X_WB, whole_time(0)),
-                         SteadyPose(question.X_WB, whole_time(1))};
-    const FirstContact contact =
-        *FindFirstContact({set.query_a(question), {question.X_WA, question.X_WA}},
-                          {set.query_b(question), X_WB, radius});
+    const Motion X_WB = {SteadyPose(query.X_WB, whole_time(0)),
+                         SteadyPose(query.X_WB, whole_time(1))};
+    const FirstContact contact = *FindFirstContact({set.query_a(query), {query.X_WA, query.X_WA}},
+                                                   {set.query_b(query), X_WB, radius});
     if (contact.relation == Relation::kSeparated) continue;
     return {true, whole_time(contact.separated_until),
             whole_time(contact.contact_time.value_or(1))};
@@ -88,10 +86,10 @@ SteadyContact FindSteadyContact(const MotionSet& set, const MotionSet::Question&
   return {};
 }
 
-MotionTruth SteadyTruth(const MotionSet& set, const MotionSet::Question& question) {
-  const SteadyContact wider = FindSteadyContact(set, question, kDeviation);
+MotionTruth SteadyTruth(const MotionSet& set, const MotionSet::Query& query) {
+  const SteadyContact wider = FindSteadyContact(set, query, kDeviation);
   if (!wider.meets) return {false};
-  const SteadyContact contact = FindSteadyContact(set, question, 0);
+  const SteadyContact contact = FindSteadyContact(set, query, 0);
   if (!contact.meets) return {};
   return {true, wider.separated_until, contact.contact_time};
 }
@@ -100,9 +98,8 @@ MotionTruth SteadyTruth(const MotionSet& set, const MotionSet::Question& questio
 
 std::vector<MotionTruth> FindTruth(const MotionSet& set, Path path) {
   std::vector<MotionTruth> truth;
-  for (const MotionSet::Question& question : set.questions) {
-    truth.push_back(path == Path::kLinear ? ProvenTruth(set, question)
-                                          : SteadyTruth(set, question));
+  for (const MotionSet::Query& query : set.queries) {
+    truth.push_back(path == Path::kLinear ? ProvenTruth(set, query) : SteadyTruth(set, query));
   }
   return truth;
 }

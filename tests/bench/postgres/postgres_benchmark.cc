@@ -5,8 +5,8 @@
 //                      [--clients N] [--hulls N] [--from N] [--hulld PROGRAM]
 //
 //   commit     single-point chunks, in sequence
-//   questions  CheckCollision, LINEARIZABLE and BOUNDED, by N clients
-//   bounded    as questions, BOUNDED only, in short turns: processor time, with a second RocksDB
+//   queries  CheckCollision, LINEARIZABLE and BOUNDED, by N clients
+//   bounded    as queries, BOUNDED only, in short turns: processor time, with a second RocksDB
 //              server that shows the difference between two identical servers
 //   ingest     points of a ball into one hull
 //   fill       makes hulls FROM to N of 64 vertices in the database "bench_start"; prints the rate
@@ -30,8 +30,8 @@ namespace {
 int Run(int argc, char** argv) {
   Arguments arguments;
   const std::map<std::string, void (*)(const Arguments&)> suites = {
-      {"commit", MeasureCommits}, {"questions", MeasureQuestions}, {"bounded", MeasureBounded},
-      {"cold", MeasureCold},      {"ingest", MeasureIngest},       {"fill", Fill},
+      {"commit", MeasureCommits}, {"queries", MeasureQueries}, {"bounded", MeasureBounded},
+      {"cold", MeasureCold},      {"ingest", MeasureIngest},   {"fill", Fill},
       {"start", MeasureStarts}};
   const std::map<std::string, std::function<void(const std::string&)>> flags = {
       {"--database", [&](const std::string& value) { arguments.database = value; }},

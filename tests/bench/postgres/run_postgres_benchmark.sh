@@ -4,7 +4,7 @@
 #
 #   bash tests/bench/postgres/run_postgres_benchmark.sh [MACHINE] [SUITE...]
 #
-# SUITES: commit questions questions64 bounded ingest fill start cold; all by default. fill creates
+# SUITES: commit queries queries64 bounded ingest fill start cold; all by default. fill creates
 # HULLS (1000000) hulls, in parts that take SECONDS_EACH. start and cold use the hulls of the last
 # fill, even one of an earlier run, so that "start cold" alone measures another program over the
 # same hulls.
@@ -22,7 +22,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/../../.."
 machine=${1:-epyc_gcc12}
 shift || true
 suites=("$@")
-((${#suites[@]} > 0)) || suites=(commit questions questions64 bounded ingest fill start cold)
+((${#suites[@]} > 0)) || suites=(commit queries queries64 bounded ingest fill start cold)
 folder=${FOLDER:-/tmp/hulld-bench-postgres}
 results=tests/bench/results/postgres
 hulls=${HULLS:-1000000}
@@ -58,8 +58,8 @@ mkdir -p "$folder-stores" "$results"
 chmod 700 "$folder-stores"
 for suite in "${suites[@]}"; do
   case $suite in
-    commit | ingest | questions) measure "$suite" --out "$results/${suite}_$machine.csv" ;;
-    questions64) measure questions --clients 64 --out "$results/${suite}_$machine.csv" ;;
+    commit | ingest | queries) measure "$suite" --out "$results/${suite}_$machine.csv" ;;
+    queries64) measure queries --clients 64 --out "$results/${suite}_$machine.csv" ;;
     fill)
       from=0
       while ((from < hulls)); do

@@ -27,8 +27,8 @@ std::string StartHull(int i);
 void MeasureCommits(const Arguments& arguments);
 void MeasureIngest(const Arguments& arguments);
 
-// Queries (question_suites.cc).
-void MeasureQuestions(const Arguments& arguments);
+// Queries (query_suites.cc).
+void MeasureQueries(const Arguments& arguments);
 void MeasureBounded(const Arguments& arguments);
 void MeasureCold(const Arguments& arguments);
 

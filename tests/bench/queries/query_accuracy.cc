@@ -35,7 +35,7 @@ int Main() {
   methods.push_back(MakePlainGjkInFloat());
   for (std::unique_ptr<QueryMethod>& peer : MakePeers()) methods.push_back(std::move(peer));
 
-  std::cout << "library,questions,wrong,open,missed_collisions,invented_collisions";
+  std::cout << "library,queries,wrong,open,missed_collisions,invented_collisions";
   for (const std::string& kind : kinds) std::cout << "," << kind;
   std::cout << "\n";
   for (const std::unique_ptr<QueryMethod>& method : methods) {

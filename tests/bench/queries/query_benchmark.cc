@@ -5,7 +5,7 @@
 //       --benchmark_filter='^relation/' --benchmark_out=FILE.csv
 //
 // writes medians (CsvReporter). An iteration answers a block of distinct, independent queries.
-// Columns: `questions` in the block; `ns` per query (processor time, real time if several threads
+// Columns: `queries` in the block; `ns` per query (processor time, real time if several threads
 // work); `wrong`, the number of verdicts that differ from hulld's exact relation, which the tests
 // check against an independent oracle. `wrong` is omitted in the regime "touch", where a library
 // that rounds its rotation receives a different query. Suites:
@@ -41,7 +41,7 @@
 namespace hulld::bench {
 namespace {
 
-constexpr size_t kQuestions = 128;
+constexpr size_t kQueries = 128;
 // Enough relations that a branch predictor cannot learn the block: it learns 128 repeated queries,
 // which reduces the apparent time of most methods to two thirds.
 constexpr size_t kRelations = 4096;
@@ -56,9 +56,9 @@ class Workload {
       : set_(std::move(set)), regime_(regime), count_(count) {}
 
   Regime regime() const { return regime_; }
-  const QuerySet& questions() {
+  const QuerySet& queries() {
     Make();
-    return questions_;
+    return queries_;
   }
   const std::vector<Verdict>& truth() {
     Make();
@@ -66,10 +66,10 @@ class Workload {
   }
   const std::vector<double>& separations() {
     Make();
-    for (size_t i = separations_.size(); i < questions_.queries.size(); ++i) {
-      const QuerySet::Query& query = questions_.queries[i];
-      separations_.push_back(BestSeparation(questions_.hulls[query.hull_a], query.X_WA,
-                                            questions_.hulls[query.hull_b], query.X_WB));
+    for (size_t i = separations_.size(); i < queries_.queries.size(); ++i) {
+      const QuerySet::Query& query = queries_.queries[i];
+      separations_.push_back(BestSeparation(queries_.hulls[query.hull_a], query.X_WA,
+                                            queries_.hulls[query.hull_b], query.X_WB));
     }
     return separations_;
   }
@@ -78,10 +78,10 @@ class Workload {
   void Make() {
     if (made_) return;
     made_ = true;
-    questions_ = MakeQuerySet(set_, regime_, count_);
-    for (size_t i = 0; i < questions_.a.size(); ++i) {
+    queries_ = MakeQuerySet(set_, regime_, count_);
+    for (size_t i = 0; i < queries_.a.size(); ++i) {
       const bool apart =
-          CheckCollision(questions_.a[i], questions_.b[i])->relation == Relation::kSeparated;
+          CheckCollision(queries_.a[i], queries_.b[i])->relation == Relation::kSeparated;
       truth_.push_back(apart ? Verdict::kApart : Verdict::kColliding);
     }
   }
@@ -90,7 +90,7 @@ class Workload {
   Regime regime_;
   size_t count_;
   bool made_ = false;
-  QuerySet questions_;
+  QuerySet queries_;
   std::vector<Verdict> truth_;
   std::vector<double> separations_;
 };
@@ -102,7 +102,7 @@ struct Subject {
   bool prepared = false;
 
   bool Prepare(benchmark::State& state) {
-    const QuerySet& set = workload->questions();
+    const QuerySet& set = workload->queries();
     if (set.queries.empty()) {
       state.SkipWithError("skipped: no data");
       return false;
@@ -113,11 +113,11 @@ struct Subject {
   }
 };
 
-void ReportTime(benchmark::State& state, size_t questions) {
-  state.counters["questions"] = static_cast<double>(questions);
+void ReportTime(benchmark::State& state, size_t queries) {
+  state.counters["queries"] = static_cast<double>(queries);
   // Processor time, except for rows that use real time.
   state.counters["ns"] = benchmark::Counter(
-      1e-9 * static_cast<double>(questions),
+      1e-9 * static_cast<double>(queries),
       benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
 }
 
@@ -132,7 +132,7 @@ void ReportWrong(benchmark::State& state, Workload& workload, std::span<const Ve
 template <void (QueryMethod::*kAnswer)(size_t, std::span<Verdict>)>
 void FindRelations(benchmark::State& state, Subject& subject) {
   if (!subject.Prepare(state)) return;
-  std::vector<Verdict> verdicts(subject.workload->questions().queries.size());
+  std::vector<Verdict> verdicts(subject.workload->queries().queries.size());
   for (auto _ : state) {
     (subject.method.get()->*kAnswer)(0, verdicts);
     benchmark::DoNotOptimize(verdicts.data());
@@ -164,7 +164,7 @@ void ReportValues(benchmark::State& state, Workload& workload,
 template <void (QueryMethod::*kMeasure)(size_t, std::span<std::optional<double>>)>
 void Measure(benchmark::State& state, Subject& subject) {
   if (!subject.Prepare(state)) return;
-  std::vector<std::optional<double>> values(subject.workload->questions().queries.size());
+  std::vector<std::optional<double>> values(subject.workload->queries().queries.size());
   for (auto _ : state) {
     (subject.method.get()->*kMeasure)(0, values);
     benchmark::DoNotOptimize(values.data());
@@ -204,7 +204,7 @@ std::vector<std::vector<PlacedHull>> MakeFrames(const QuerySet& set, Motion moti
 }
 
 void FollowMotion(benchmark::State& state, Workload& workload, bool warm) {
-  const QuerySet& set = workload.questions();
+  const QuerySet& set = workload.queries();
   if (set.queries.empty()) return state.SkipWithError("skipped: no data");
   const bool turns = workload.regime() != Regime::kContact;
   const bool slides = set.name.starts_with("mating:");
@@ -241,7 +241,7 @@ double ProcessSeconds() {
 // Answers all queries many times over in one call, as a scene of placements and pairs.
 void AnswerBatch(benchmark::State& state, Workload& workload, int threads) {
   constexpr size_t kCopies = 64;
-  const QuerySet& set = workload.questions();
+  const QuerySet& set = workload.queries();
   if (set.queries.empty()) return state.SkipWithError("skipped: no data");
   std::vector<PlacedHull> placements = set.a;
   placements.insert(placements.end(), set.b.begin(), set.b.end());
@@ -348,7 +348,7 @@ void Register() {
   for (const char* set : {"sphere:8", "sphere:64", "sphere:512", "sphere:10000", "ur5"}) {
     for (const Regime regime : kRegimes) {
       RegisterRelations(set, regime);
-      const auto workload = std::make_shared<Workload>(set, regime, kQuestions);
+      const auto workload = std::make_shared<Workload>(set, regime, kQueries);
       RegisterMeasures(set, regime, workload);
       RegisterSequences(set, regime, workload);
     }
@@ -356,7 +356,7 @@ void Register() {
   for (const char* set : {"mating:8", "mating:64"}) {
     RegisterRelations(set, Regime::kContact);
     RegisterSequences(set, Regime::kContact,
-                      std::make_shared<Workload>(set, Regime::kContact, kQuestions));
+                      std::make_shared<Workload>(set, Regime::kContact, kQueries));
   }
   RegisterScenes();
 }

@@ -41,7 +41,7 @@ for suite in "${suites[@]}"; do
     # Counts are equal on every machine, so the file does not name one.
     accuracy) "$programs/query_accuracy" >$results/query_accuracy.csv ;;
     trade)
-      "$programs/hulld-bench" trade --questions 4800 --csv "$out" --plot "$results/query_trade_$machine.svg"
+      "$programs/hulld-bench" trade --queries 4800 --csv "$out" --plot "$results/query_trade_$machine.svg"
       ;;
     *)
       echo "run_query_benchmark.sh: unknown suite $suite" >&2

@@ -88,7 +88,7 @@ void RunScene(benchmark::State& state, SceneWorkload& scene, Count count) {
   const size_t truth = scene.CountByHulld(0);
   state.counters["ns"] = benchmark::Counter(
       1e-9, benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
-  state.counters["questions"] = static_cast<double>(scene.hull_of().size());
+  state.counters["queries"] = static_cast<double>(scene.hull_of().size());
   state.counters["pairs"] = static_cast<double>(found);
   state.counters["wrong"] = std::abs(static_cast<double>(found) - static_cast<double>(truth));
 }

@@ -203,7 +203,7 @@ int Run(int argc, char** argv) {
   std::vector<int> counts;
   for (int i = 2; i < argc; ++i) counts.push_back(std::atoi(argv[i]));
   if (counts.empty()) counts = {64, 1000, 10'000, 100'000, 1'000'000};
-  std::printf("vertices,case,questions,p50_us,p99_us,p50_ratio,p99_ratio,writer_chunks_per_s\n");
+  std::printf("vertices,case,queries,p50_us,p99_us,p50_ratio,p99_ratio,writer_chunks_per_s\n");
   for (const int vertices : counts) Measure(program, vertices);
   return 0;
 }

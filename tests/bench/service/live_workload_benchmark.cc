@@ -359,8 +359,8 @@ void MeasureCamera(const std::string& program, double scale) {
   request.mutable_a()->set_hull_id(HullId(0));
   request.mutable_b()->set_hull_id(kProbe);
   request.mutable_b()->mutable_pose()->mutable_translation()->set_z(1.1);
-  Row frame = {"depth camera, 848 x 480", "frame and question"};
-  Row question = {frame.work, "question alone"};
+  Row frame = {"depth camera, 848 x 480", "frame and query"};
+  Row query = {frame.work, "query alone"};
   for (int i = 0; i < count; ++i) {
     double asking = 0;
     const double time = Timed([&] {
@@ -372,9 +372,9 @@ void MeasureCamera(const std::string& program, double scale) {
       });
     });
     frame.times.push_back(time);
-    question.times.push_back(asking);
+    query.times.push_back(asking);
   }
-  for (const Row& row : {frame, question}) Print(row, row);
+  for (const Row& row : {frame, query}) Print(row, row);
 }
 
 void MeasureColdScene(const std::string& program, double scale) {

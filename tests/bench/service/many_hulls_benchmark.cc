@@ -143,12 +143,12 @@ class ManyHulls {
 int Run(Store& store, int hulls) {
   ManyHulls many(store, hulls);
   many.Create();
-  many.Ask("first question");
-  many.Ask("second question");
-  many.Ask("third question");
+  many.Ask("first query");
+  many.Ask("second query");
+  many.Ask("third query");
   many.Idle("idle once");
   many.Idle("idle");
-  many.Ask("question after idle");
+  many.Ask("query after idle");
   many.Idle("idle once");
   many.Idle("idle");
   many.Append();

@@ -94,7 +94,7 @@ Sample Repeat(int clients, double seconds, double per_call,
   return Summarize(std::move(all), SecondsSince(start), per_call);
 }
 
-const QuerySet& Ur5Questions(Regime regime, size_t count) {
+const QuerySet& Ur5Queries(Regime regime, size_t count) {
   static std::map<std::pair<Regime, size_t>, QuerySet> sets;
   const auto [found, is_new] = sets.try_emplace({regime, count});
   if (is_new) found->second = MakeQuerySet("ur5", regime, count);
@@ -138,7 +138,7 @@ struct Batch {
 // Makes `count` pairs by repeating `distinct` queries of a regime.
 std::shared_ptr<Batch> MakeBatch(Regime regime, size_t distinct, size_t count,
                                  Form form = Form::kList) {
-  const QuerySet& set = Ur5Questions(regime, distinct);
+  const QuerySet& set = Ur5Queries(regime, distinct);
   auto batch = std::make_shared<Batch>();
   batch->placed = set.a;
   batch->placed.insert(batch->placed.end(), set.b.begin(), set.b.end());
@@ -201,7 +201,7 @@ struct Motion {
 std::shared_ptr<Motion> MakeMotion(size_t count) {
   constexpr size_t kFrames = 16;
   constexpr double kStep = 1e-3;
-  const QuerySet& set = Ur5Questions(Regime::kClose, count);
+  const QuerySet& set = Ur5Queries(Regime::kClose, count);
   auto motion = std::make_shared<Motion>();
   for (size_t i = 0; i < count; ++i) {
     const QuerySet::Query& query = set.queries[i];
@@ -269,7 +269,7 @@ struct Scene {
 
 // About three radii of room for each of `count` links.
 std::shared_ptr<Scene> MakeScene(size_t count, Form form) {
-  const QuerySet& hulls = Ur5Questions(Regime::kFar, 1);
+  const QuerySet& hulls = Ur5Queries(Regime::kFar, 1);
   Random random(20261121);
   auto scene = std::make_shared<Scene>();
   double radii = 0;
@@ -315,10 +315,10 @@ void SearchInProcess(std::span<const PlacedHull> placed) {
 }  // namespace
 
 std::vector<RemoteWorkload> MakeCheckWorkloads(double seconds) {
-  constexpr size_t kQuestions = 128;
-  auto requests = std::make_shared<std::vector<v1::CheckCollisionRequest>>(kQuestions);
-  const QuerySet& set = Ur5Questions(Regime::kClose, kQuestions);
-  for (size_t i = 0; i < kQuestions; ++i) {
+  constexpr size_t kQueries = 128;
+  auto requests = std::make_shared<std::vector<v1::CheckCollisionRequest>>(kQueries);
+  const QuerySet& set = Ur5Queries(Regime::kClose, kQueries);
+  for (size_t i = 0; i < kQueries; ++i) {
     const QuerySet::Query& query = set.queries[i];
     FillPlacement(query.hull_a, query.X_WA, (*requests)[i].mutable_a());
     FillPlacement(query.hull_b, query.X_WB, (*requests)[i].mutable_b());
@@ -331,9 +331,8 @@ std::vector<RemoteWorkload> MakeCheckWorkloads(double seconds) {
       return Repeat(clients, seconds, 1, [&](int client, size_t i) {
         grpc::ClientContext context;
         v1::CheckCollisionResponse response;
-        CheckOk(
-            subject.stub(client).CheckCollision(&context, (*requests)[i % kQuestions], &response),
-            "a check");
+        CheckOk(subject.stub(client).CheckCollision(&context, (*requests)[i % kQueries], &response),
+                "a check");
       });
     };
     workloads.push_back(

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "tests/bench/trade/trade.h"
-#include "tests/bench/trade/trade_questions.h"
+#include "tests/bench/trade/trade_queries.h"
 #ifdef HULLD_HAVE_CLIENT
 #include "tests/bench/trade/hull_sources.h"
 #endif
@@ -22,7 +22,7 @@ struct TradeArguments {
   std::vector<std::string> files;
   std::vector<std::string> hull_ids;
   std::string server = "127.0.0.1:50551";
-  size_t questions = 480;
+  size_t queries = 480;
   TradeSettings settings;
   std::string csv;
   std::string plot;
@@ -37,8 +37,8 @@ void AddTradeOptions(CLI::App& command, TradeArguments& arguments) {
   command.add_option("--server", arguments.server, "Server that stores them: host:port")
       ->capture_default_str();
 #endif
-  command.add_option("--questions", arguments.questions, "Approximate number of queries")
-      ->check(CLI::Range(size_t{TradeQuestions::kLevels}, size_t{1000000}))
+  command.add_option("--queries", arguments.queries, "Approximate number of queries")
+      ->check(CLI::Range(size_t{TradeQueries::kLevels}, size_t{1000000}))
       ->capture_default_str();
   command.add_option("--rounds", arguments.settings.rounds, "Number of rounds; times are medians")
       ->check(CLI::Range(1, 1000))
@@ -89,8 +89,7 @@ bool WriteFile(const std::string& path, const Trade& trade,
 int RunTrade(const TradeArguments& arguments) {
   std::vector<Hull> hulls;
   if (!CollectHulls(arguments, hulls)) return kFailed;
-  const TradeQuestions questions =
-      MakeTradeQuestions(hulls, arguments.questions / TradeQuestions::kLevels);
+  const TradeQueries queries = MakeTradeQueries(hulls, arguments.queries / TradeQueries::kLevels);
   size_t least = hulls[0].vertices().size();
   size_t most = least;
   for (const Hull& hull : hulls) {
@@ -98,8 +97,8 @@ int RunTrade(const TradeArguments& arguments) {
     most = std::max(most, hull.vertices().size());
   }
   std::cout << hulls.size() << " hulls of " << least << " to " << most << " vertices\n\n";
-  std::vector<TradeMethod> methods = MakeTradeMethods(questions.size);
-  const Trade trade = MeasureTrade(questions, methods, arguments.settings);
+  std::vector<TradeMethod> methods = MakeTradeMethods(queries.size);
+  const Trade trade = MeasureTrade(queries, methods, arguments.settings);
   WriteTradeTable(trade, std::cout);
   const bool written = WriteFile(arguments.csv, trade, WriteTradeCsv) &&
                        WriteFile(arguments.plot, trade, WriteTradePlot);

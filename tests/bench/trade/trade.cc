@@ -34,7 +34,7 @@ class Measurement {
  public:
   using Ask = void (QueryMethod::*)(size_t first, std::span<Value> values);
 
-  Measurement(QueryMethod* method, Ask ask, TradeQuestions::Range range)
+  Measurement(QueryMethod* method, Ask ask, TradeQueries::Range range)
       : method_(method), ask_(ask), range_(range), values_(range.count) {}
 
   const std::vector<Value>& values() const { return values_; }
@@ -67,7 +67,7 @@ class Measurement {
  private:
   QueryMethod* method_;
   Ask ask_;
-  TradeQuestions::Range range_;
+  TradeQueries::Range range_;
   std::vector<Value> values_;
   bool too_slow_ = false;
   int repetitions_ = 1;
@@ -88,7 +88,7 @@ std::optional<TradeAnswers> Summarize(const VerdictMeasurement& measured,
   if (measured.too_slow()) return std::nullopt;
   TradeAnswers answers;
   answers.nanoseconds = measured.nanoseconds();
-  answers.questions = truth.size();
+  answers.queries = truth.size();
   for (size_t i = 0; i < truth.size(); ++i) {
     if (measured.values()[i] == Verdict::kOpen) {
       ++answers.open;
@@ -107,7 +107,7 @@ std::optional<TradeDepths> Summarize(const std::optional<DepthMeasurement>& meas
   std::vector<double> errors;
   for (size_t i = 0; i < truth.size(); ++i) {
     if (!truth[i]) continue;
-    ++depths.questions;
+    ++depths.queries;
     if (const std::optional<double> depth = measured->values()[i]) {
       errors.push_back(std::abs(*depth - *truth[i]) / size);
     } else {
@@ -121,39 +121,39 @@ std::optional<TradeDepths> Summarize(const std::optional<DepthMeasurement>& meas
   return depths;
 }
 
-std::vector<Verdict> ExactVerdicts(const TradeQuestions& questions) {
+std::vector<Verdict> ExactVerdicts(const TradeQueries& queries) {
   const std::unique_ptr<QueryMethod> exact = MakeHulld();
-  exact->Prepare(questions.hulls, questions.queries);
-  std::vector<Verdict> verdicts(questions.queries.size());
+  exact->Prepare(queries.hulls, queries.queries);
+  std::vector<Verdict> verdicts(queries.queries.size());
   exact->Answer(0, verdicts);
   return verdicts;
 }
 
 // nullopt if the hulls are apart.
-std::vector<std::optional<double>> BestDepths(const TradeQuestions& questions) {
+std::vector<std::optional<double>> BestDepths(const TradeQueries& queries) {
   std::vector<std::optional<double>> depths;
-  for (size_t i = 0; i < questions.depth.count; ++i) {
-    const QuerySet::Query& query = questions.queries[questions.depth.first + i];
-    const double separation = BestSeparation(questions.hulls[query.hull_a], query.X_WA,
-                                             questions.hulls[query.hull_b], query.X_WB);
+  for (size_t i = 0; i < queries.depth.count; ++i) {
+    const QuerySet::Query& query = queries.queries[queries.depth.first + i];
+    const double separation = BestSeparation(queries.hulls[query.hull_a], query.X_WA,
+                                             queries.hulls[query.hull_b], query.X_WB);
     depths.emplace_back();
     if (separation <= 0) depths.back() = -separation;
   }
   return depths;
 }
 
-void CheckByOracle([[maybe_unused]] const TradeQuestions& questions,
+void CheckByOracle([[maybe_unused]] const TradeQueries& queries,
                    [[maybe_unused]] std::span<const Verdict> truth, [[maybe_unused]] Trade& trade) {
 #ifdef HULLD_HAVE_ORACLE
   constexpr size_t kMaxVertices = 200;
   constexpr double kMaxSeconds = 60;
   const double start = ThreadSeconds();
   for (size_t i = 0; i < truth.size() && ThreadSeconds() - start < kMaxSeconds; ++i) {
-    const QuerySet::Query& query = questions.queries[i];
-    if (questions.hulls[query.hull_a].vertices().size() > kMaxVertices) continue;
-    if (questions.hulls[query.hull_b].vertices().size() > kMaxVertices) continue;
+    const QuerySet::Query& query = queries.queries[i];
+    if (queries.hulls[query.hull_a].vertices().size() > kMaxVertices) continue;
+    if (queries.hulls[query.hull_b].vertices().size() > kMaxVertices) continue;
     ++trade.checked;
-    trade.differing += OracleVerdict(questions.hulls, query) != truth[i] ? 1 : 0;
+    trade.differing += OracleVerdict(queries.hulls, query) != truth[i] ? 1 : 0;
   }
 #endif
 }
@@ -188,24 +188,24 @@ std::vector<TradeMethod> MakeTradeMethods(double size) {
   return methods;
 }
 
-Trade MeasureTrade(const TradeQuestions& questions, std::vector<TradeMethod>& methods,
+Trade MeasureTrade(const TradeQueries& queries, std::vector<TradeMethod>& methods,
                    const TradeSettings& settings) {
   Trade trade;
-  const std::vector<Verdict> truth = ExactVerdicts(questions);
-  const std::vector<std::optional<double>> depths = BestDepths(questions);
-  trade.questions = truth.size();
-  CheckByOracle(questions, truth, trade);
+  const std::vector<Verdict> truth = ExactVerdicts(queries);
+  const std::vector<std::optional<double>> depths = BestDepths(queries);
+  trade.queries = truth.size();
+  CheckByOracle(queries, truth, trade);
 
   std::vector<Measured> measured;
   for (const TradeMethod& each : methods) {
     QueryMethod* method = each.method.get();
-    method->Prepare(questions.hulls, questions.queries);
-    measured.push_back({{method, &QueryMethod::Answer, questions.ordinary},
-                        {method, &QueryMethod::Answer, questions.near_contact},
+    method->Prepare(queries.hulls, queries.queries);
+    measured.push_back({{method, &QueryMethod::Answer, queries.ordinary},
+                        {method, &QueryMethod::Answer, queries.near_contact},
                         {}});
     Measured& last = measured.back();
     if (method->knows_depth()) {
-      last.depth.emplace(method, &QueryMethod::MeasureDepths, questions.depth);
+      last.depth.emplace(method, &QueryMethod::MeasureDepths, queries.depth);
       last.depth->RunFirst(settings.max_seconds);
     }
     last.ordinary.RunFirst(settings.max_seconds);
@@ -219,13 +219,13 @@ Trade MeasureTrade(const TradeQuestions& questions, std::vector<TradeMethod>& me
     }
   }
   for (size_t i = 0; i < methods.size(); ++i) {
-    const auto part = [&](TradeQuestions::Range range) {
+    const auto part = [&](TradeQueries::Range range) {
       return std::span(truth).subspan(range.first, range.count);
     };
     trade.rows.push_back({methods[i].method->name(), methods[i].family,
-                          Summarize(measured[i].ordinary, part(questions.ordinary)),
-                          Summarize(measured[i].near_contact, part(questions.near_contact)),
-                          Summarize(measured[i].depth, depths, questions.size)});
+                          Summarize(measured[i].ordinary, part(queries.ordinary)),
+                          Summarize(measured[i].near_contact, part(queries.near_contact)),
+                          Summarize(measured[i].depth, depths, queries.size)});
   }
   return trade;
 }

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "tests/bench/queries/query_method.h"
-#include "tests/bench/trade/trade_questions.h"
+#include "tests/bench/trade/trade_queries.h"
 
 namespace hulld::bench {
 
@@ -28,15 +28,15 @@ std::vector<TradeMethod> MakeTradeMethods(double size);
 // Answers of a method on one range of queries. Absent if it would have taken too long.
 struct TradeAnswers {
   double nanoseconds = 0;  // per query, median of the rounds, processor time
-  size_t questions = 0;
+  size_t queries = 0;
   size_t wrong = 0;
   size_t open = 0;
 };
 struct TradeDepths {
   double nanoseconds = 0;
-  size_t questions = 0;
+  size_t queries = 0;
   size_t none = 0;  // no depth was found, though the hulls overlap
-  // Errors of the depths found, relative to TradeQuestions::size.
+  // Errors of the depths found, relative to TradeQueries::size.
   double median_error = 0;
   double largest_error = 0;
 };
@@ -58,13 +58,13 @@ struct Trade {
   std::vector<TradeRow> rows;
   // hulld's exact relation is the reference. `checked` queries also ran against the tests' oracle,
   // if built in and fast enough; it differed `differing` times.
-  size_t questions = 0;
+  size_t queries = 0;
   size_t checked = 0;
   size_t differing = 0;
 };
 
 // Runs every query with every method, alternating the methods in each round.
-Trade MeasureTrade(const TradeQuestions& questions, std::vector<TradeMethod>& methods,
+Trade MeasureTrade(const TradeQueries& queries, std::vector<TradeMethod>& methods,
                    const TradeSettings& settings);
 
 void WriteTradeTable(const Trade& trade, std::ostream& out);

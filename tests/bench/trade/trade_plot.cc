@@ -240,7 +240,7 @@ Panel AnswersPanel(const Trade& trade, std::string title,
     const std::optional<TradeAnswers>& each = row.*answers;
     if (!each) continue;
     const double percent =
-        100 * static_cast<double>(each->wrong) / static_cast<double>(each->questions);
+        100 * static_cast<double>(each->wrong) / static_cast<double>(each->queries);
     panel.marks.push_back({number, row.family, each->nanoseconds, percent, each->open > 0});
   }
   return panel;
@@ -268,7 +268,7 @@ std::string LegendText(const TradeRow& row) {
   std::string text = row.method;
   if (row.near_contact && row.near_contact->open > 0) {
     const double share = 100 * static_cast<double>(row.near_contact->open) /
-                         static_cast<double>(row.near_contact->questions);
+                         static_cast<double>(row.near_contact->queries);
     text += " (" + std::to_string(static_cast<int>(std::lround(share))) + " % open near contact)";
   }
   return text;

@@ -29,7 +29,7 @@ void WriteAnswersCsv(const std::optional<TradeAnswers>& answers, std::ostream& o
     out << ",,,,";
     return;
   }
-  out << "," << answers->nanoseconds << "," << answers->questions << "," << answers->wrong << ","
+  out << "," << answers->nanoseconds << "," << answers->queries << "," << answers->wrong << ","
       << answers->open;
 }
 
@@ -58,18 +58,18 @@ void WriteTradeTable(const Trade& trade, std::ostream& out) {
   const TradeRow& first = trade.rows.front();
   out << "\nPer query; processor time on one thread, medians. ";
   if (first.ordinary && first.near_contact) {
-    out << first.ordinary->questions << " ordinary queries, " << first.near_contact->questions
+    out << first.ordinary->queries << " ordinary queries, " << first.near_contact->queries
         << " near contact.\n";
   }
   out << "Lengths (tau, simplified, errors of the depth) are relative to the hulls' mean radius.\n"
       << "The reference is hulld's exact relation; an oracle that shares no code with it answered "
-      << trade.checked << " of the " << trade.questions << " queries and differed "
-      << trade.differing << " times.\n";
+      << trade.checked << " of the " << trade.queries << " queries and differed " << trade.differing
+      << " times.\n";
 }
 
 void WriteTradeCsv(const Trade& trade, std::ostream& out) {
-  out << "method,ordinary_ns,ordinary_questions,ordinary_wrong,ordinary_open,near_contact_ns,"
-         "near_contact_questions,near_contact_wrong,near_contact_open,depth_ns,depth_questions,"
+  out << "method,ordinary_ns,ordinary_queries,ordinary_wrong,ordinary_open,near_contact_ns,"
+         "near_contact_queries,near_contact_wrong,near_contact_open,depth_ns,depth_queries,"
          "depth_none,depth_median_relative_error,depth_largest_relative_error\n";
   for (const TradeRow& row : trade.rows) {
     std::string name = row.method;
@@ -78,7 +78,7 @@ void WriteTradeCsv(const Trade& trade, std::ostream& out) {
     WriteAnswersCsv(row.ordinary, out);
     WriteAnswersCsv(row.near_contact, out);
     if (row.depth) {
-      out << "," << row.depth->nanoseconds << "," << row.depth->questions << "," << row.depth->none
+      out << "," << row.depth->nanoseconds << "," << row.depth->queries << "," << row.depth->none
           << "," << row.depth->median_error << "," << row.depth->largest_error << "\n";
     } else {
       out << ",,,,,\n";

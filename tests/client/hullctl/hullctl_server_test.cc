@@ -29,7 +29,7 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-class HullctlQuestions : public HullctlOnServer {
+class HullctlQueries : public HullctlOnServer {
  protected:
   // Returns a recorded answer, as written by `check --record`.
   static std::string Recorded(const v1::CheckCollisionRequest& request,
@@ -50,7 +50,7 @@ class HullctlQuestions : public HullctlOnServer {
   }
 };
 
-TEST_F(HullctlQuestions, ValuesFromAListTakeAnyLetterCase) {
+TEST_F(HullctlQueries, ValuesFromAListTakeAnyLetterCase) {
   const TempFile file("points", "1 2 3\n4 5 6\n");
   for (const std::string& name : PointFormatNames()) {
     const Ran lower = Ask({"append", name, file.path(), "--create", "--format", name});
@@ -66,7 +66,7 @@ TEST_F(HullctlQuestions, ValuesFromAListTakeAnyLetterCase) {
 }
 
 // Commands without --format recommended it, too.
-TEST_F(HullctlQuestions, OnlyCommandsWithAFormatOptionRecommendIt) {
+TEST_F(HullctlQueries, OnlyCommandsWithAFormatOptionRecommendIt) {
   Put("cube", server::Cube());
   const TempFile file("part.step", "ISO-10303-21;\n");
   EXPECT_THAT(Ask({"append", "cube", file.path()}).err,
@@ -76,7 +76,7 @@ TEST_F(HullctlQuestions, OnlyCommandsWithAFormatOptionRecommendIt) {
   EXPECT_THAT(cover.err, Not(HasSubstr("--format")));
 }
 
-TEST_F(HullctlQuestions, VerifyDistinguishesValidInvalidAndUncheckable) {
+TEST_F(HullctlQueries, VerifyDistinguishesValidInvalidAndUncheckable) {
   Put("cube", server::Cube());
   auto [request, response] = TouchingCubes();
   const TempFile valid("valid.json", Recorded(request, response));
@@ -114,7 +114,7 @@ TEST_F(HullctlQuestions, VerifyDistinguishesValidInvalidAndUncheckable) {
   EXPECT_THAT(ran.err, HasSubstr("was deleted"));
 }
 
-TEST_F(HullctlQuestions, MotionsShowTheirFirstContact) {
+TEST_F(HullctlQueries, MotionsShowTheirFirstContact) {
   Put("cube", server::Cube());
   const std::vector<std::string> meets = {"check", "cube",   "cube",  "--pose-b",
                                           "3,0,0", "--to-b", "-1,0,0"};
@@ -142,7 +142,7 @@ TEST_F(HullctlQuestions, MotionsShowTheirFirstContact) {
   EXPECT_THAT(ran.out, Not(HasSubstr("first contact")));
 }
 
-TEST_F(HullctlQuestions, MotionsTakeTheShorterPath) {
+TEST_F(HullctlQueries, MotionsTakeTheShorterPath) {
   Put("cube", server::Cube());
   const auto end_of = [this](const std::string& from, const std::string& to) {
     const Ran ran = Ask({"check", "cube", "cube", "--pose-a", from, "--to-a", to, "--record", "-"});
@@ -161,7 +161,7 @@ TEST_F(HullctlQuestions, MotionsTakeTheShorterPath) {
   EXPECT_EQ(end_of("3,0,0,4,0,0,0", "5,0,0"), (Numbers{3, 0, 0, 4}));
 }
 
-TEST_F(HullctlQuestions, RecordedMotionsAreVerified) {
+TEST_F(HullctlQueries, RecordedMotionsAreVerified) {
   Put("cube", server::Cube());
   const Ran recorded = Ask({"check", "cube", "cube", "--pose-b", "3,0.25,0.5", "--to-b",
                             "1,0,0,1,-1,0,0", "--max-time-error", "0.001", "--record", "-"});
@@ -182,7 +182,7 @@ TEST_F(HullctlQuestions, RecordedMotionsAreVerified) {
   EXPECT_THAT(ran.err, HasSubstr("has no first contact"));
 }
 
-TEST_F(HullctlQuestions, CastListsHitsInOrderOfTime) {
+TEST_F(HullctlQueries, CastListsHitsInOrderOfTime) {
   Put("near/cube", server::Cube());
   Put("far/wall", {4, -1, -1, 4, 2, -1, 4, -1, 2, 4, 2, 2});
   Put("far/behind", {-9, 0, 0});
@@ -213,7 +213,7 @@ TEST_F(HullctlQuestions, CastListsHitsInOrderOfTime) {
   EXPECT_EQ(Ask({"cast", origin, "8,0,0", "none/"}).out, "HULL  TIME  POINT  NORMAL\n");
 }
 
-TEST_F(HullctlQuestions, VerifyRefusesOtherFiles) {
+TEST_F(HullctlQueries, VerifyRefusesOtherFiles) {
   const TempFile no_json("no.json", "relation SEPARATED\n");
   EXPECT_EQ(Ask({"verify", no_json.path()}).code, 2);
   const TempFile no_request("bare.json", MessageJson(v1::CheckCollisionResponse()));
@@ -223,7 +223,7 @@ TEST_F(HullctlQuestions, VerifyRefusesOtherFiles) {
   EXPECT_EQ(Ask({"verify", "/no/such/file"}).code, 2);
 }
 
-TEST_F(HullctlQuestions, CheckVerifiesAtOnceAndRecordsForLater) {
+TEST_F(HullctlQueries, CheckVerifiesAtOnceAndRecordsForLater) {
   Put("cube", server::Cube());
   for (const char* pose : {"0.5,0,0", "1,0,0", "1,1,1", "3,0,0", "1,1,0,0,0,0,1"}) {
     const Ran ran = Ask({"check", "cube", "cube", "--pose-b", pose, "--verify"});
@@ -262,7 +262,7 @@ std::string LatticeScene(uint32_t seed, int placements) {
   return text.str();
 }
 
-TEST_F(HullctlQuestions, EveryCertificateOfABatchIsValid) {
+TEST_F(HullctlQueries, EveryCertificateOfABatchIsValid) {
   Put("cube", server::Cube());
   Put("ball", server::Sphere(40));
   Put("square", {0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0});
@@ -302,7 +302,7 @@ TEST_F(HullctlQuestions, EveryCertificateOfABatchIsValid) {
   }
 }
 
-TEST_F(HullctlQuestions, CertificatesOfCachedAnswersAreValid) {
+TEST_F(HullctlQueries, CertificatesOfCachedAnswersAreValid) {
   Put("cube", server::Cube(-0.5, 1));
   Put("ball", server::Sphere(80));
   ClientOptions options;
@@ -343,7 +343,7 @@ TEST_F(HullctlQuestions, CertificatesOfCachedAnswersAreValid) {
   EXPECT_TRUE(stream->Close().ok());
 }
 
-TEST_F(HullctlQuestions, SceneFindsCollisions) {
+TEST_F(HullctlQueries, SceneFindsCollisions) {
   Put("cube", server::Cube());
   const std::string placements =
       R"({"placements":[{"hullId":"cube"},{"hullId":"cube","pose":{"translation":{"x":1}}},
@@ -384,7 +384,7 @@ TEST_F(HullctlQuestions, SceneFindsCollisions) {
   EXPECT_THAT(ran.err, HasSubstr("placement 0:nope: hull \"nope\" not found"));
 }
 
-TEST_F(HullctlQuestions, StreamAnswersEachLineByALine) {
+TEST_F(HullctlQueries, StreamAnswersEachLineByALine) {
   Put("cube", server::Cube());
   const TempFile file("poses.jsonl",
                       R"({"placements":[{"hullId":"cube"},{"hullId":"cube"}],"pairs":[0,1]})"
@@ -410,7 +410,7 @@ TEST_F(HullctlQuestions, StreamAnswersEachLineByALine) {
   EXPECT_EQ(answers[2].columns().relations(0), v1::RELATION_SEPARATED);
 }
 
-TEST_F(HullctlQuestions, EachCommandAcceptsEachSceneFormat) {
+TEST_F(HullctlQueries, EachCommandAcceptsEachSceneFormat) {
   Put("cube", server::Cube());
   const TempFile yaml("yaml",
                       "place:\n  a: {id: cube}\n  b: {id: cube, at: [1, 0, 0]}\n"
@@ -440,7 +440,7 @@ TEST_F(HullctlQuestions, EachCommandAcceptsEachSceneFormat) {
   EXPECT_THAT(ran.err, HasSubstr("finds pairs itself, but the file names pairs"));
 }
 
-TEST_F(HullctlQuestions, StreamErrorsNameTheLineOrTheField) {
+TEST_F(HullctlQueries, StreamErrorsNameTheLineOrTheField) {
   Put("cube", server::Cube());
   const std::string open = R"({"placements":[{"hullId":"cube"},{"hullId":"nope"}],"pairs":[0,1]})"
                            "\n";
@@ -459,7 +459,7 @@ TEST_F(HullctlQuestions, StreamErrorsNameTheLineOrTheField) {
   EXPECT_THAT(ran.err, HasSubstr("contains no scene"));
 }
 
-TEST_F(HullctlQuestions, AFileThatDoesNotExistIsNotOnlyAMissingHull) {
+TEST_F(HullctlQueries, AFileThatDoesNotExistIsNotOnlyAMissingHull) {
   Put("cube", server::Cube());
   for (const char* name : {"part.stl", "part"}) {
     const Ran ran = Ask({"check", name, "cube"});
@@ -475,7 +475,7 @@ TEST_F(HullctlQuestions, AFileThatDoesNotExistIsNotOnlyAMissingHull) {
   EXPECT_THAT(ran.err, HasSubstr("\" not found; " + step + ": unknown file extension; convert"));
 }
 
-TEST_F(HullctlQuestions, AMeshIsNotWrittenUnderTheNameOfAnotherFormat) {
+TEST_F(HullctlQueries, AMeshIsNotWrittenUnderTheNameOfAnotherFormat) {
   Put("cube", server::Cube());
   const std::string file = testing::TempDir() + "hulld_mesh.stl";
   const Ran ran = Ask({"mesh", "cube", "-o", file});
@@ -484,7 +484,7 @@ TEST_F(HullctlQuestions, AMeshIsNotWrittenUnderTheNameOfAnotherFormat) {
   EXPECT_FALSE(std::filesystem::exists(file));
 }
 
-TEST_F(HullctlQuestions, ConflictingOptionsAreExplained) {
+TEST_F(HullctlQueries, ConflictingOptionsAreExplained) {
   Put("cube", server::Cube());
   const auto usage = [this](std::vector<std::string> options, const std::string& problem) {
     options.insert(options.begin(), {"check", "cube", "cube"});
@@ -511,7 +511,7 @@ TEST_F(HullctlQuestions, ConflictingOptionsAreExplained) {
   }
 }
 
-TEST_F(HullctlQuestions, LoadReportsEveryModeAndLeavesNoHullBehind) {
+TEST_F(HullctlQueries, LoadReportsEveryModeAndLeavesNoHullBehind) {
   Put("cube", server::Cube());
   for (const char* mode : {"check", "batch", "append", "mixed"}) {
     const Ran ran = Ask({"bench", "load", "--mode", mode, "--clients", "2", "--requests", "30",
@@ -525,7 +525,7 @@ TEST_F(HullctlQuestions, LoadReportsEveryModeAndLeavesNoHullBehind) {
   EXPECT_EQ(Ask({"list"}).out, Ask({"list", "cube"}).out);
 }
 
-TEST_F(HullctlQuestions, LoadCountsItemsInJson) {
+TEST_F(HullctlQueries, LoadCountsItemsInJson) {
   const Ran ran = Ask({"bench", "load", "--mode", "batch", "--requests", "5", "--pairs", "70",
                        "--rate", "1000", "--json"});
   EXPECT_EQ(ran.code, 0) << ran.err;
@@ -549,7 +549,7 @@ TEST_F(HullctlQuestions, LoadCountsItemsInJson) {
   EXPECT_EQ(counted, 5);
 }
 
-TEST_F(HullctlQuestions, LoadRefusesAPrefixThatIsInUse) {
+TEST_F(HullctlQueries, LoadRefusesAPrefixThatIsInUse) {
   Put("mine/cube", server::Cube());
   const Ran ran = Ask({"bench", "load", "--requests", "1", "--prefix", "mine"});
   EXPECT_EQ(ran.code, 1);
@@ -557,7 +557,7 @@ TEST_F(HullctlQuestions, LoadRefusesAPrefixThatIsInUse) {
   EXPECT_EQ(Get("mine/cube").hull().vertex_count(), 8U);
 }
 
-TEST_F(HullctlQuestions, LoadShowsErrorsByCode) {
+TEST_F(HullctlQueries, LoadShowsErrorsByCode) {
   const Ran ran = Ask({"bench", "load", "--mode", "append", "--requests", "2", "--timeout", "5s",
                        "--prefix", "a b"});
   EXPECT_EQ(ran.code, 1);
@@ -566,7 +566,7 @@ TEST_F(HullctlQuestions, LoadShowsErrorsByCode) {
 }
 
 // The signal is sent after hulls of the load exist; the load itself would take minutes.
-TEST_F(HullctlQuestions, AnInterruptedLoadReportsAndDeletesItsHulls) {
+TEST_F(HullctlQueries, AnInterruptedLoadReportsAndDeletesItsHulls) {
   std::thread interrupter([this] {
     v1::ListHullsRequest request;
     request.set_prefix("short/append-");
@@ -589,7 +589,7 @@ TEST_F(HullctlQuestions, AnInterruptedLoadReportsAndDeletesItsHulls) {
   EXPECT_EQ(left.hulls_size(), 0);
 }
 
-TEST_F(HullctlQuestions, NonsensicalLoadOptionsAreExplained) {
+TEST_F(HullctlQueries, NonsensicalLoadOptionsAreExplained) {
   Ran ran = Ask({"bench", "load", "--rate", "0"});
   EXPECT_EQ(ran.code, 2);
   EXPECT_THAT(ran.err, HasSubstr("--rate: \"0\" is not a number of requests per second"));

@@ -329,7 +329,7 @@ def test_an_answer_is_neither_true_nor_false(either: Any, name: str) -> None:
         bool(either.check_collisions([name, name]).answers)
 
 
-def test_a_batch_answers_as_single_questions_do(
+def test_a_batch_answers_as_single_queries_do(
     either: Any, name: str, rng: np.random.Generator
 ) -> None:
     put(either, name, ball(rng, 40))

@@ -44,7 +44,7 @@ def test_hulls_are_proven(
     for other in set(hulld.Relation) - {relation}:
         with pytest.raises(hulld.VerificationError):
             verifier.check(cube, (cube, (x, 0, 0)), dataclasses.replace(answer, relation=other))
-    # It proves nothing about another question.
+    # It proves nothing about another query.
     with pytest.raises(hulld.VerificationError):
         verifier.check(cube, (cube, (9 if x <= 1 else 0.5, 0, 0)), answer)
     with pytest.raises(hulld.VerificationError, match="no certificate"):

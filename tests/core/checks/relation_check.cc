@@ -42,7 +42,7 @@ std::string AnalysisFault(const Hull& a, const Hull& b, const Answer& answer) {
 
 testing::AssertionResult RelationCheck::Ask(const Hull& a, const Pose& X_WA, const Hull& b,
                                             const Pose& X_WB, Relation expected, Ways ways) {
-  ++questions_;
+  ++queries_;
   ++relations_[static_cast<size_t>(expected)];
   for (Method method : {Method::kCertifiedSearch, Method::kTextbookSat}) {
     if (method == Method::kTextbookSat && ways == kSearchOnly) continue;

@@ -24,7 +24,7 @@ class RelationCheck {
   testing::AssertionResult Ask(const Hull& a, const Pose& X_WA, const Hull& b, const Pose& X_WB,
                                Relation expected, Ways ways = kAllWays);
 
-  int questions() const { return questions_; }
+  int queries() const { return queries_; }
   // Returns the number of queries with this relation.
   int count(Relation relation) const { return relations_[static_cast<size_t>(relation)]; }
   // Return the number of answers of the default method from this rung, or with this kind of axis.
@@ -37,7 +37,7 @@ class RelationCheck {
   testing::AssertionResult AskOnce(const Hull& a, const Pose& X_WA, const Hull& b, const Pose& X_WB,
                                    Relation expected, Method method);
 
-  int questions_ = 0;
+  int queries_ = 0;
   std::array<int, 4> relations_ = {};
   std::array<int, kRungCount> rungs_ = {};
   std::array<int, 5> kinds_ = {};

@@ -11,7 +11,7 @@ namespace hulld {
 namespace {
 
 // A query in the oracle's types.
-struct Question {
+struct Query {
   std::vector<oracle::Point> a;
   oracle::Placement X_WA;
   std::vector<oracle::Point> b;
@@ -29,7 +29,7 @@ bool IsNear(const std::vector<oracle::Point>& points, const oracle::Placement& p
   return oracle::Compare(oracle::BruteForceDistance(points, pose, point, identity), error) <= 0;
 }
 
-testing::AssertionResult WitnessIsValid(const Question& q, const Answer& answer) {
+testing::AssertionResult WitnessIsValid(const Query& q, const Answer& answer) {
   const auto failure = [] { return testing::AssertionFailure() << "witness: "; };
   const Witness& witness = *answer.witness;
   if (!(witness.error >= 0)) return failure() << "no error";
@@ -74,14 +74,13 @@ QueryOptions WantSeparation(std::optional<double> max_error) {
 testing::AssertionResult SeparationCheck::Ask(const Hull& a, const Pose& X_WA, const Hull& b,
                                               const Pose& X_WB, std::optional<double> max_error) {
   const auto failure = [&] { return testing::AssertionFailure() << Describe(a, X_WA, b, X_WB); };
-  const Question q = {ToOracle(a.vertices()), ToOracle(X_WA), ToOracle(b.vertices()),
-                      ToOracle(X_WB)};
+  const Query q = {ToOracle(a.vertices()), ToOracle(X_WA), ToOracle(b.vertices()), ToOracle(X_WB)};
   QueryOptions options = WantSeparation(max_error);
   const absl::StatusOr<Answer> answer = CheckCollision(a, X_WA, b, X_WB, options);
   if (!answer.ok()) return failure() << answer.status();
   const Relation relation = OracleRelation(a, X_WA, b, X_WB);
   if (answer->relation != relation) return failure() << "relation";
-  ++questions_;
+  ++queries_;
   ++relations_[static_cast<int>(relation)];
   const auto [value, bound] = *answer->separation;
   const int sign = (value > 0) - (value < 0);

@@ -17,7 +17,7 @@ class SeparationCheck {
   testing::AssertionResult Ask(const Hull& a, const Pose& X_WA, const Hull& b, const Pose& X_WB,
                                std::optional<double> max_error = std::nullopt);
 
-  int questions() const { return questions_; }
+  int queries() const { return queries_; }
   int count(Relation relation) const { return relations_[static_cast<int>(relation)]; }
   // Number of separations with a bound that only exact arithmetic achieves, and with a larger
   // bound.
@@ -25,7 +25,7 @@ class SeparationCheck {
   int float_count() const { return float_; }
 
  private:
-  int questions_ = 0;
+  int queries_ = 0;
   int relations_[4] = {};
   int exact_ = 0;
   int float_ = 0;

@@ -15,13 +15,13 @@ namespace accuracy_suite_test {
 TEST(AccuracySuite, EveryQueryIsAnsweredExactly) {
 #ifdef HULLD_SANITIZED
   constexpr size_t kStride = 11;
-  constexpr size_t kQuestions = 422;
+  constexpr size_t kQueries = 422;
 #else
   constexpr size_t kStride = 1;
-  constexpr size_t kQuestions = 4640;
+  constexpr size_t kQueries = 4640;
 #endif
   const bench::AccuracySuite suite = bench::MakeAccuracySuite(kStride);
-  ASSERT_EQ(suite.queries.size(), kQuestions);
+  ASSERT_EQ(suite.queries.size(), kQueries);
   std::map<Relation, size_t> relations;
   std::map<Rung, size_t> rungs;
   for (size_t i = 0; i < suite.queries.size(); ++i) {
@@ -32,17 +32,17 @@ TEST(AccuracySuite, EveryQueryIsAnsweredExactly) {
     ASSERT_TRUE(answer.ok()) << answer.status();
     const Relation expected = OracleRelation(a, query.X_WA, b, query.X_WB);
     EXPECT_EQ(Name(answer->relation), std::string(Name(expected)))
-        << suite.kinds[i] << ", question " << i << "\n"
+        << suite.kinds[i] << ", query " << i << "\n"
         << Describe(a, query.X_WA, b, query.X_WB);
     ++relations[expected];
     ++rungs[answer->rung];
   }
   // The suite has the intended mix: every relation, many beyond floating point.
-  EXPECT_GT(relations[Relation::kSeparated], kQuestions / 3);
-  EXPECT_GT(relations[Relation::kTouching], kQuestions / 20);
-  EXPECT_GT(relations[Relation::kOverlapping], kQuestions / 3);
-  EXPECT_GT(rungs[Rung::kFloatingPoint], kQuestions / 4);
-  EXPECT_GT(rungs[Rung::kExact], kQuestions / 10);
+  EXPECT_GT(relations[Relation::kSeparated], kQueries / 3);
+  EXPECT_GT(relations[Relation::kTouching], kQueries / 20);
+  EXPECT_GT(relations[Relation::kOverlapping], kQueries / 3);
+  EXPECT_GT(rungs[Rung::kFloatingPoint], kQueries / 4);
+  EXPECT_GT(rungs[Rung::kExact], kQueries / 10);
 }
 
 }  // namespace accuracy_suite_test

@@ -166,10 +166,10 @@ TEST(ContactMatrix, IntegerPosesTouchExactlyAndOneStepDecides) {
                           OracleRelation(slide.a, slide.X_WA, slide.b, slide.X_WB)))
         << "seed " << seed << " pair " << i;
   }
-  EXPECT_GT(check.count(Relation::kTouching), check.questions() / 3);
-  EXPECT_GT(check.count(Relation::kSeparated), check.questions() / 4);
-  EXPECT_GT(check.count(Relation::kOverlapping), check.questions() / 20);
-  EXPECT_GT(check.count(Rung::kExact), check.questions() / 3);
+  EXPECT_GT(check.count(Relation::kTouching), check.queries() / 3);
+  EXPECT_GT(check.count(Relation::kSeparated), check.queries() / 4);
+  EXPECT_GT(check.count(Relation::kOverlapping), check.queries() / 20);
+  EXPECT_GT(check.count(Rung::kExact), check.queries() / 3);
 }
 
 TEST(ContactMatrix, CommonPosesTouchExactlyAndOneStepDecides) {
@@ -197,9 +197,9 @@ TEST(ContactMatrix, CommonPosesTouchExactlyAndOneStepDecides) {
     ASSERT_TRUE(check.Ask(overlap.a, overlap.X_WA, overlap.b, overlap.X_WB, expected))
         << "seed " << seed << " pair " << i;
   }
-  EXPECT_GE(check.count(Relation::kTouching), check.questions() / 3);
-  EXPECT_GE(check.count(Relation::kSeparated), check.questions() / 3);
-  EXPECT_GT(check.count(Relation::kOverlapping), check.questions() / 20);
+  EXPECT_GE(check.count(Relation::kTouching), check.queries() / 3);
+  EXPECT_GE(check.count(Relation::kSeparated), check.queries() / 3);
+  EXPECT_GT(check.count(Relation::kOverlapping), check.queries() / 20);
 }
 
 // Rounded coordinates: offset and scale inside the hulls themselves, unrotated and at quarter
@@ -229,9 +229,9 @@ TEST(ContactMatrix, RoundedCoordinatesAreAnsweredExactly) {
     ASSERT_TRUE(check.Ask(hull_a, pose, hull_b, pose, expected))
         << "seed " << seed << " pair " << i;
   }
-  EXPECT_GT(check.count(Relation::kTouching), check.questions() / 10);
-  EXPECT_GT(check.count(Relation::kSeparated), check.questions() / 10);
-  EXPECT_GT(check.count(Relation::kOverlapping), check.questions() / 20);
+  EXPECT_GT(check.count(Relation::kTouching), check.queries() / 10);
+  EXPECT_GT(check.count(Relation::kSeparated), check.queries() / 10);
+  EXPECT_GT(check.count(Relation::kOverlapping), check.queries() / 20);
 }
 
 // Needles and polygons that pierce each other deeply or minimally.
@@ -302,8 +302,8 @@ TEST(ContactMatrix, FlatPairsInOnePlaneTouchOrSeparate) {
     ASSERT_NE(expected, Relation::kOverlapping);
     ASSERT_TRUE(check.Ask(a, pose, b, pose, expected)) << "seed " << seed << " round " << i;
   }
-  EXPECT_GT(check.count(Relation::kTouching), check.questions() / 8);
-  EXPECT_GT(check.count(Relation::kSeparated), check.questions() / 8);
+  EXPECT_GT(check.count(Relation::kTouching), check.queries() / 8);
+  EXPECT_GT(check.count(Relation::kSeparated), check.queries() / 8);
 }
 
 }  // namespace contact_matrix_test

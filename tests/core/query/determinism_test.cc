@@ -104,7 +104,7 @@ TEST_F(Determinism, SimdPathsGiveTheSameAnswers) {
   for (size_t i = 0; i < suite_.queries.size(); ++i) {
     const Answer expected = Ask(suite_.queries[i]);
     const OnPath portable(SimdPath::kPortable);
-    SCOPED_TRACE(testing::Message() << suite_.kinds[i] << ", question " << i);
+    SCOPED_TRACE(testing::Message() << suite_.kinds[i] << ", query " << i);
     ExpectSameBits(Ask(suite_.queries[i]), expected);
     if (HasFailure()) break;
   }
@@ -134,7 +134,7 @@ TEST_F(Determinism, SwappingTheHullsMirrorsEveryField) {
   for (size_t i = 0; i < suite_.queries.size(); ++i) {
     const Answer there = Ask(suite_.queries[i]);
     Answer back = AskSwapped(suite_.queries[i]);
-    SCOPED_TRACE(testing::Message() << suite_.kinds[i] << ", question " << i);
+    SCOPED_TRACE(testing::Message() << suite_.kinds[i] << ", query " << i);
     if (back.axis) {
       back.axis->direction = -back.axis->direction;
       std::swap(back.axis->feature_a, back.axis->feature_b);
@@ -170,7 +170,7 @@ TEST_F(Determinism, WarmCachesChangeNoValue) {
     const PlacedHull placed_a = PlacedHull::Make(a, query.X_WA).value();
     const PlacedHull placed_b = PlacedHull::Make(b, query.X_WB).value();
     ASSERT_TRUE(CheckCollision(placed_a, PlacedHull::Make(b, nearby).value(), {}, &cache).ok());
-    SCOPED_TRACE(testing::Message() << suite_.kinds[i] << ", question " << i);
+    SCOPED_TRACE(testing::Message() << suite_.kinds[i] << ", query " << i);
     for (int round = 0; round < 2; ++round) {
       ExpectSameValues(CheckCollision(placed_a, placed_b, Everything(), &cache).value(), cold);
       const Answer plain = CheckCollision(placed_a, placed_b, {}, &cache).value();

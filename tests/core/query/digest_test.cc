@@ -155,7 +155,7 @@ using Digests = std::map<std::string, Digest>;
 std::vector<Hull> DigestSnapshots(Digests& digests) {
   std::vector<Hull> hulls;
   for (const std::vector<Vector>& cloud : Clouds()) {
-    for (const Vector& p : cloud) digests["questions"].Add(p);
+    for (const Vector& p : cloud) digests["queries"].Add(p);
     HullBuilder builder;
     EXPECT_TRUE(builder.Add(cloud).ok());
     hulls.push_back(builder.Snapshot());
@@ -393,10 +393,10 @@ TEST_P(DigestTest, IsTheSameOnEveryProcessor) {
   std::map<std::string, uint64_t> hashes;
   for (const auto& [what, digest] : digests) hashes[what] = digest.hash();
   const std::map<std::string, uint64_t> expected = {
-      {"questions", 7004395885791083578u}, {"snapshots", 13234861685057146501u},
-      {"answers", 16753716120942393610u},   {"large hulls", 9140888216483074039u},
-      {"growth", 18348015413602966233u},   {"bodies", 8722161731354521458u},
-      {"scenes", 17493975837864731952u},   {"simplifications", 12435222911359296737u},
+      {"queries", 7004395885791083578u},  {"snapshots", 13234861685057146501u},
+      {"answers", 16753716120942393610u}, {"large hulls", 9140888216483074039u},
+      {"growth", 18348015413602966233u},  {"bodies", 8722161731354521458u},
+      {"scenes", 17493975837864731952u},  {"simplifications", 12435222911359296737u},
   };
   EXPECT_EQ(hashes, expected);
 }

@@ -98,11 +98,11 @@ TEST(NearContact, GenericPairsNearContactMatchTheOracle) {
       }
     }
   }
-  EXPECT_GT(check.questions(), kRounds * 4);
-  EXPECT_GT(check.count(Relation::kSeparated), check.questions() / 4);
-  EXPECT_GT(check.count(Relation::kOverlapping), check.questions() / 4);
-  EXPECT_GT(check.count(Rung::kFloatingPoint), check.questions() / 10);
-  EXPECT_GT(check.count(Rung::kExact), check.questions() / 4);
+  EXPECT_GT(check.queries(), kRounds * 4);
+  EXPECT_GT(check.count(Relation::kSeparated), check.queries() / 4);
+  EXPECT_GT(check.count(Relation::kOverlapping), check.queries() / 4);
+  EXPECT_GT(check.count(Rung::kFloatingPoint), check.queries() / 10);
+  EXPECT_GT(check.count(Rung::kExact), check.queries() / 4);
 }
 
 // Hulls that are tiny relative to their distance from the origin of their frames, down to a few
@@ -129,16 +129,16 @@ TEST(NearContact, TinyHullsFarFromTheirOriginMatchTheOracle) {
         << "seed " << seed << " round " << round;
   }
   for (Relation relation : {Relation::kSeparated, Relation::kTouching, Relation::kOverlapping}) {
-    EXPECT_GT(check.count(relation), check.questions() / 40) << Name(relation);
+    EXPECT_GT(check.count(relation), check.queries() / 40) << Name(relation);
   }
-  EXPECT_GT(check.count(Rung::kFloatingPoint), check.questions() / 10);
-  EXPECT_GT(check.count(Rung::kExact), check.questions() / 4);
+  EXPECT_GT(check.count(Rung::kFloatingPoint), check.queries() / 10);
+  EXPECT_GT(check.count(Rung::kExact), check.queries() / 4);
 }
 
-// Returns the number of queries of the next test: HULLD_NEAR_CONTACT_QUESTIONS in the environment
+// Returns the number of queries of the next test: HULLD_NEAR_CONTACT_QUERIES in the environment
 // (a million in manual runs); few by default.
-int QuestionsToAsk() {
-  const char* given = std::getenv("HULLD_NEAR_CONTACT_QUESTIONS");
+int QueriesToAsk() {
+  const char* given = std::getenv("HULLD_NEAR_CONTACT_QUERIES");
   return given != nullptr ? std::atoi(given) : kRounds;
 }
 
@@ -149,7 +149,7 @@ TEST(NearContact, RandomQueriesMatchTheOracle) {
   const uint64_t seed = TestSeed(904);
   Random random(seed);
   RelationCheck check;
-  for (int question = 0; question < QuestionsToAsk(); ++question) {
+  for (int query = 0; query < QueriesToAsk(); ++query) {
     const double scale = std::ldexp(1.0, random.Between(-900, 900));
     const auto points = [&](const Vector& offset) {
       std::vector<Vector> result =
@@ -171,18 +171,18 @@ TEST(NearContact, RandomQueriesMatchTheOracle) {
         points(Vector(random.Between(-2, 2), random.Between(-2, 2), random.Between(-2, 2))));
     const Relation expected = OracleRelation(a, X_WA, b, X_WB);
     ASSERT_TRUE(check.Ask(a, X_WA, b, X_WB, expected, RelationCheck::kSearchOnly))
-        << "seed " << seed << " question " << question;
+        << "seed " << seed << " query " << query;
   }
   for (Relation relation : {Relation::kSeparated, Relation::kTouching, Relation::kOverlapping}) {
     RecordProperty(Name(relation), check.count(relation));
-    EXPECT_GT(check.count(relation), check.questions() / 40) << Name(relation);
+    EXPECT_GT(check.count(relation), check.queries() / 40) << Name(relation);
   }
   RecordProperty("spheres", check.count(Rung::kBounds));
   RecordProperty("floating_point", check.count(Rung::kFloatingPoint));
   RecordProperty("exact", check.count(Rung::kExact));
-  EXPECT_GT(check.count(Rung::kBounds), check.questions() / 100);
-  EXPECT_GT(check.count(Rung::kFloatingPoint), check.questions() / 10);
-  EXPECT_GT(check.count(Rung::kExact), check.questions() / 10);
+  EXPECT_GT(check.count(Rung::kBounds), check.queries() / 100);
+  EXPECT_GT(check.count(Rung::kFloatingPoint), check.queries() / 10);
+  EXPECT_GT(check.count(Rung::kExact), check.queries() / 10);
 }
 
 // Solids with the cube's symmetry, whole and flat, in units of four.
@@ -218,11 +218,11 @@ TEST(NearContact, SymmetricSolidsOnALatticeMatchTheOracle) {
   const std::vector<Hull> solids = SymmetricSolids();
   const std::array<double, 4> turns[] = {{1, 0, 0, 0}, {1, 1, 0, 0}, {1, 1, 1, 1},
                                          {0, 1, 1, 0}, {2, 1, 0, 0}, {3, 1, 1, 1}};
-  int question = random.Below(kStride);
+  int query = random.Below(kStride);
   for (size_t i = 0; i < solids.size(); ++i) {
     for (size_t j = i; j < solids.size(); ++j) {
       for (const Vector& t : LatticeCube(5, 2)) {
-        if (++question % kStride != 0) continue;
+        if (++query % kStride != 0) continue;
         Pose X_WA, X_WB;
         X_WA.q = turns[random.Below(4)];
         X_WB.q = turns[random.Below(6)];
@@ -234,7 +234,7 @@ TEST(NearContact, SymmetricSolidsOnALatticeMatchTheOracle) {
     }
   }
   for (Relation relation : {Relation::kSeparated, Relation::kTouching, Relation::kOverlapping}) {
-    EXPECT_GT(check.count(relation), check.questions() / 40) << Name(relation);
+    EXPECT_GT(check.count(relation), check.queries() / 40) << Name(relation);
   }
 }
 

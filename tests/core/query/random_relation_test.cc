@@ -66,20 +66,20 @@ void MoveIntoContact(Random& random, const std::vector<Vector>& a, std::vector<V
 }
 
 // Two sets and their poses, in contact in a third of the cases.
-struct Question {
+struct Query {
   std::vector<Vector> a;
   std::vector<Vector> b;
   Pose X_WA;
   Pose X_WB;
 };
 
-Question SmallQuestion(Random& random) {
-  Question question = {SmallSet(random), SmallSet(random), SmallPose(random), SmallPose(random)};
+Query SmallQuery(Random& random) {
+  Query query = {SmallSet(random), SmallSet(random), SmallPose(random), SmallPose(random)};
   if (random.Below(3) == 0) {
-    MoveIntoContact(random, question.a, question.b);
-    question.X_WB = question.X_WA;
+    MoveIntoContact(random, query.a, query.b);
+    query.X_WB = query.X_WA;
   }
-  return question;
+  return query;
 }
 
 Pose Scaled(Pose pose, double scale) {
@@ -92,11 +92,11 @@ TEST(RandomRelation, SmallIntegerHullsMatchTheOracle) {
   Random random(seed);
   RelationCheck check;
   for (int round = 0; round < kRounds; ++round) {
-    const Question question = SmallQuestion(random);
-    const Hull a = BuildHull(question.a);
-    const Hull b = BuildHull(question.b);
-    const Relation expected = OracleRelation(a, question.X_WA, b, question.X_WB);
-    ASSERT_TRUE(check.Ask(a, question.X_WA, b, question.X_WB, expected))
+    const Query query = SmallQuery(random);
+    const Hull a = BuildHull(query.a);
+    const Hull b = BuildHull(query.b);
+    const Relation expected = OracleRelation(a, query.X_WA, b, query.X_WB);
+    ASSERT_TRUE(check.Ask(a, query.X_WA, b, query.X_WB, expected))
         << "seed " << seed << " round " << round;
   }
   for (Relation relation : {Relation::kSeparated, Relation::kTouching, Relation::kOverlapping}) {
@@ -116,7 +116,7 @@ TEST(RandomRelation, ScalesAndQuaternionMultiplesChangeNothing) {
   Random random(seed);
   RelationCheck check;
   for (int round = 0; round < kRounds / 4; ++round) {
-    auto [a, b, X_WA, X_WB] = SmallQuestion(random);
+    auto [a, b, X_WA, X_WB] = SmallQuery(random);
     const Relation expected = OracleRelation(BuildHull(a), X_WA, BuildHull(b), X_WB);
     // Coordinates are multiples of 1/2 below 8: exact from 2^-1073 to 2^1020.
     const double scale = std::ldexp(1.0, random.Between(-1073, 1020));
@@ -138,7 +138,7 @@ TEST(RandomRelation, NearlyDegenerateHullsMatchTheOracle) {
     const auto nudge = [&](double& x) {
       if (random.Below(8) == 0) x = std::nextafter(x, random.Below(2) ? kInfinity : -kInfinity);
     };
-    const Question question = SmallQuestion(random);
+    const Query query = SmallQuery(random);
     const auto rounded = [&](const std::vector<Vector>& exact) {
       std::vector<Vector> points = hulld::Scaled(exact, scale);
       for (Vector& p : points) {
@@ -152,15 +152,15 @@ TEST(RandomRelation, NearlyDegenerateHullsMatchTheOracle) {
       if (random.Below(4) == 0) nudge(pose.q[random.Below(4)]);
       return pose;
     };
-    const Hull a = rounded(question.a);
-    const Hull b = rounded(question.b);
-    const Pose X_WA = nudged(question.X_WA);
-    const Pose X_WB = nudged(question.X_WB);
+    const Hull a = rounded(query.a);
+    const Hull b = rounded(query.b);
+    const Pose X_WA = nudged(query.X_WA);
+    const Pose X_WB = nudged(query.X_WB);
     ASSERT_TRUE(check.Ask(a, X_WA, b, X_WB, OracleRelation(a, X_WA, b, X_WB)))
         << "seed " << seed << " round " << round;
   }
   for (Relation relation : {Relation::kSeparated, Relation::kTouching, Relation::kOverlapping}) {
-    EXPECT_GT(check.count(relation), check.questions() / 50) << Name(relation);
+    EXPECT_GT(check.count(relation), check.queries() / 50) << Name(relation);
   }
 }
 
@@ -224,9 +224,9 @@ TEST(RandomRelation, GenericHullsMatchTheOracle) {
     ASSERT_TRUE(check.Ask(a, X_WA, b, X_WB, OracleRelation(a, X_WA, b, X_WB)))
         << "seed " << seed << " round " << round;
   }
-  EXPECT_GT(check.count(Rung::kFloatingPoint), check.questions());
-  EXPECT_GT(check.count(Relation::kSeparated), check.questions() / 10);
-  EXPECT_GT(check.count(Relation::kOverlapping), check.questions() / 10);
+  EXPECT_GT(check.count(Rung::kFloatingPoint), check.queries());
+  EXPECT_GT(check.count(Relation::kSeparated), check.queries() / 10);
+  EXPECT_GT(check.count(Relation::kOverlapping), check.queries() / 10);
 }
 
 }  // namespace random_relation_test

@@ -19,7 +19,7 @@ using ::testing::HasSubstr;
 
 class BodyCertificates : public BodyTest {
  protected:
-  static v1::CheckCollisionRequest Question(const v1::Placement& a, const v1::Placement& b) {
+  static v1::CheckCollisionRequest Query(const v1::Placement& a, const v1::Placement& b) {
     v1::CheckCollisionRequest request;
     *request.mutable_a() = a;
     *request.mutable_b() = b;
@@ -66,7 +66,7 @@ class BodyCertificates : public BodyTest {
 
 TEST_F(BodyCertificates, EveryRelationIsProven) {
   PutRows(30);
-  const auto overlap = Prove(Question(PlacementOf("row"), PlacementOf("row", 3.5, 0.5, 0)));
+  const auto overlap = Prove(Query(PlacementOf("row"), PlacementOf("row", 3.5, 0.5, 0)));
   EXPECT_EQ(overlap.relation(), v1::RELATION_OVERLAPPING);
   ASSERT_EQ(overlap.piece_certificates_size(), 1);
   EXPECT_EQ(overlap.piece_certificates(0).piece_a(), overlap.piece_a().index());
@@ -75,18 +75,18 @@ TEST_F(BodyCertificates, EveryRelationIsProven) {
   EXPECT_EQ(overlap.piece_hulls(0).hull_id(), "cube");
   EXPECT_EQ(overlap.piece_hulls(0).revision(), Get("cube").hull().revision());
 
-  const auto touching = Prove(Question(PlacementOf("row"), PlacementOf("row", 0, 1, 0)));
+  const auto touching = Prove(Query(PlacementOf("row"), PlacementOf("row", 0, 1, 0)));
   EXPECT_EQ(touching.relation(), v1::RELATION_TOUCHING);
   EXPECT_EQ(touching.piece_certificates_size(), 30);
 
   // Under a common rotation, the boxes intersect but the hulls do not.
   const auto apart =
-      Prove(Question(Turned(PlacementOf("row")), Turned(PlacementOf("row", 0.8, 0.8, 0.8))));
+      Prove(Query(Turned(PlacementOf("row")), Turned(PlacementOf("row", 0.8, 0.8, 0.8))));
   EXPECT_EQ(apart.relation(), v1::RELATION_SEPARATED);
   EXPECT_GT(apart.piece_certificates_size(), 10);
   EXPECT_FALSE(apart.has_piece_a());
 
-  const auto far = Prove(Question(PlacementOf("row"), PlacementOf("row", 0, 9, 0)));
+  const auto far = Prove(Query(PlacementOf("row"), PlacementOf("row", 0, 9, 0)));
   EXPECT_EQ(far.relation(), v1::RELATION_SEPARATED);
   EXPECT_EQ(far.piece_certificates_size(), 0);
 }
@@ -94,7 +94,7 @@ TEST_F(BodyCertificates, EveryRelationIsProven) {
 TEST_F(BodyCertificates, HullsWithBodiesAndDetailsWithCertificates) {
   PutRows(3);
   Put("probe", Cube());
-  v1::CheckCollisionRequest request = Question(PlacementOf("probe", 2, 1, 0), PlacementOf("row"));
+  v1::CheckCollisionRequest request = Query(PlacementOf("probe", 2, 1, 0), PlacementOf("row"));
   request.mutable_wanted()->set_separation(true);
   request.mutable_wanted()->set_axis(true);
   const auto touching = Prove(request);
@@ -112,15 +112,14 @@ TEST_F(BodyCertificates, PosesComposeExactly) {
   Put("cube", Cube());
   ASSERT_TRUE(PutBody("left", {PlacementOf("cube", 0.25, 0.2, 0.3)}).ok());
   ASSERT_TRUE(PutBody("right", {PlacementOf("cube", 1.25, 0.2, 0.3)}).ok());
-  const auto touching = Prove(Question(Turned(PlacementOf("left", 17.3, -4.1, 1e6)),
-                                       Turned(PlacementOf("right", 17.3, -4.1, 1e6))));
+  const auto touching = Prove(Query(Turned(PlacementOf("left", 17.3, -4.1, 1e6)),
+                                    Turned(PlacementOf("right", 17.3, -4.1, 1e6))));
   EXPECT_EQ(touching.relation(), v1::RELATION_TOUCHING);
 }
 
 TEST_F(BodyCertificates, AlteredCertificatesAreRefused) {
   PutRows(3);
-  const v1::CheckCollisionRequest request =
-      Question(PlacementOf("row"), PlacementOf("row", 0, 1, 0));
+  const v1::CheckCollisionRequest request = Query(PlacementOf("row"), PlacementOf("row", 0, 1, 0));
   const v1::CheckCollisionResponse proven = Prove(request);
   ASSERT_EQ(proven.piece_certificates_size(), 3);
   const auto refused = [&](const v1::CheckCollisionResponse& altered) {
@@ -156,7 +155,7 @@ TEST_F(BodyCertificates, AChangedHullMakesACertificateUncheckable) {
   PutRows(3);
   Put("probe", Cube());
   const v1::CheckCollisionRequest request =
-      Question(PlacementOf("row"), PlacementOf("probe", 0, 1, 0));
+      Query(PlacementOf("row"), PlacementOf("probe", 0, 1, 0));
   const v1::CheckCollisionResponse proven = Prove(request);
   ASSERT_TRUE(PutBody("row", {PlacementOf("cube")}).ok());
   Verification later = Verify(request, proven);
@@ -179,7 +178,7 @@ TEST_F(BodyCertificates, TooManyAreRefusedAndTheLimitIsNamed) {
   ASSERT_TRUE(PutBody("heap", pieces).ok());
   // 10000 pairs touch.
   const auto many =
-      MakeClient().CheckCollision(Question(PlacementOf("heap"), PlacementOf("heap", 1, 0, 0)));
+      MakeClient().CheckCollision(Query(PlacementOf("heap"), PlacementOf("heap", 1, 0, 0)));
   EXPECT_TRUE(absl::IsResourceExhausted(many.status()));
   EXPECT_EQ(ReasonOf(many.status()), v1::ERROR_REASON_PROOF_TOO_LARGE);
   EXPECT_THAT(MetadataOf(many.status(), "limit"), testing::Optional(std::string("8192")));
@@ -187,7 +186,7 @@ TEST_F(BodyCertificates, TooManyAreRefusedAndTheLimitIsNamed) {
   // 8100 pairs touch, and fit.
   ASSERT_TRUE(PutBody("less", std::vector<v1::Placement>(81, PlacementOf("cube"))).ok());
   const auto fits =
-      MakeClient().CheckCollision(Question(PlacementOf("heap"), PlacementOf("less", 1, 0, 0)));
+      MakeClient().CheckCollision(Query(PlacementOf("heap"), PlacementOf("less", 1, 0, 0)));
   ASSERT_TRUE(fits.ok()) << fits.status();
   EXPECT_EQ(fits->piece_certificates_size(), 8100);
   EXPECT_LT(fits->ByteSizeLong(), size_t{4} << 20);

@@ -35,14 +35,14 @@ class TextbookMemory : public ServerTest {
     Put("cube", Cube(-0.5));
     // Makes the canonical snapshots.
     for (const char* other : {"beside", "cube"}) {
-      v1::CheckCollisionRequest request = Question("large", other);
+      v1::CheckCollisionRequest request = Query("large", other);
       request.set_method(v1::METHOD_UNSPECIFIED);
       request.mutable_wanted()->set_certificate(true);
       Check(request);
     }
     before_ = HeldBytes();
   }
-  static v1::CheckCollisionRequest Question(const std::string& a, const std::string& b) {
+  static v1::CheckCollisionRequest Query(const std::string& a, const std::string& b) {
     v1::CheckCollisionRequest request;
     request.set_method(v1::METHOD_TEXTBOOK_SAT);
     *request.mutable_a() = PlacementOf(a);
@@ -73,14 +73,14 @@ TEST_F(TextbookMemory, AStartedPairIsCountedAndFurtherOnesAreRefused) {
   std::atomic<bool> is_answered = false;
   std::thread first([&] {
     v1::CheckCollisionResponse response;
-    status = collisions_->CheckCollision(&context, Question("beside", "large"), &response);
+    status = collisions_->CheckCollision(&context, Query("beside", "large"), &response);
     is_answered = true;
   });
   while (!IsCounted() && !is_answered) std::this_thread::yield();
   EXPECT_FALSE(is_answered);
-  ExpectRefused(CheckError(Question("large", "cube")));
+  ExpectRefused(CheckError(Query("large", "cube")));
   // A small pair is still answered.
-  EXPECT_EQ(Check(Question("cube", "cube")).relation(), v1::RELATION_OVERLAPPING);
+  EXPECT_EQ(Check(Query("cube", "cube")).relation(), v1::RELATION_OVERLAPPING);
   context.TryCancel();
   first.join();
   EXPECT_EQ(status.error_code(), grpc::StatusCode::CANCELLED);
@@ -111,7 +111,7 @@ TEST_F(TextbookMemory, ABatchIsCountedFromSliceToSlice) {
   });
   while (!IsCounted() && !is_answered) std::this_thread::yield();
   for (int look = 0; look < 100 && !is_answered; ++look) EXPECT_TRUE(IsCounted());
-  ExpectRefused(CheckError(Question("large", "cube")));
+  ExpectRefused(CheckError(Query("large", "cube")));
   EXPECT_FALSE(is_answered);
   context.TryCancel();
   answers.join();

@@ -87,7 +87,7 @@ class SharedStore : public MemoryStore, public PeerFeed {
     const std::lock_guard lock(mutex_);
     return asked_;
   }
-  void AwaitQuestion(int number) {
+  void AwaitQuery(int number) {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return asked_ >= number; });
   }
@@ -198,31 +198,31 @@ TEST_F(RegistryFreshnessTest, ABoundThatIsHalfUsedUpHasTheStoreAskedOnceForReads
     ASSERT_TRUE(read.ok());
     EXPECT_GE(read->staleness, minutes(40));
   }
-  store_.AwaitQuestion(before + 1);
+  store_.AwaitQuery(before + 1);
   store_.Release();
   // A read that joined the request of earlier reads: no other request was sent in between.
   ASSERT_TRUE(registry_.barrier().AwaitPeers({}).ok());
   EXPECT_EQ(store_.asked(), before + 2);
 }
 
-TEST_F(RegistryFreshnessTest, ABoundIsMeasuredFromTheQuestionAndNotFromItsAnswer) {
+TEST_F(RegistryFreshnessTest, ABoundIsMeasuredFromTheQueryAndNotFromItsAnswer) {
   store_.Hold();
   const int before = store_.asked();
   auto first = ReadElsewhere("h", {});
-  store_.AwaitQuestion(before + 1);
+  store_.AwaitQuery(before + 1);
   // Acknowledged before the second read begins, after the request was sent.
   store_.CreateElsewhere("h", 1);
-  Freshness after_the_question;
-  after_the_question.began = SteadyClock::now();
+  Freshness after_the_query;
+  after_the_query.began = SteadyClock::now();
   store_.Release();
   EXPECT_TRUE(absl::IsNotFound(first.get().status()));
-  const auto second = Read("h", after_the_question);
+  const auto second = Read("h", after_the_query);
   ASSERT_TRUE(second.ok()) << second.status();
   EXPECT_EQ(second->revision, 1);
   EXPECT_EQ(store_.asked(), before + 2);
 }
 
-TEST_F(RegistryFreshnessTest, ALinearizableReadThatBeganBeforeAQuestionNeedsNoOther) {
+TEST_F(RegistryFreshnessTest, ALinearizableReadThatBeganBeforeAQueryNeedsNoOther) {
   Freshness began_before;
   began_before.began = SteadyClock::now();
   ASSERT_TRUE(registry_.barrier().AwaitPeers({}).ok());
@@ -252,7 +252,7 @@ TEST_F(RegistryFreshnessTest, ARevisionThatIsNotHereIsWaitedFor) {
   store_.Hold();
   const int before = store_.asked();
   auto read = ReadElsewhere("h", AtLeast(7));
-  store_.AwaitQuestion(before + 1);
+  store_.AwaitQuery(before + 1);
   store_.Release();
   const absl::StatusOr<AsOf> answer = read.get();
   ASSERT_TRUE(answer.ok()) << answer.status();

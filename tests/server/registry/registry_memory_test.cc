@@ -112,7 +112,7 @@ TEST_F(RegistryMemory, APinnedVersionIsNotReadAgain) {
   Start();
   Registry& registry = hulls_->registry();
   const std::vector<std::string> ids = {"h"};
-  const ReadPlan plan = {.expected_questions = 1'000'000};
+  const ReadPlan plan = {.expected_queries = 1'000'000};
   KnownHulls known;
   const absl::StatusOr<Resolved> first = registry.reader().Refresh(ids, known, {}, plan);
   ASSERT_TRUE(first.ok() && first->hulls[0].ok());

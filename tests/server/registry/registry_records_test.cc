@@ -35,7 +35,7 @@ class VastStore : public MemoryStore {
     return absl::OkStatus();
   }
   absl::StatusOr<FoundRecords> FindRecords(std::span<const std::string> ids) override {
-    ++questions;
+    ++queries;
     records += ids.size();
     if (is_gone) return absl::UnavailableError("the store cannot be queried");
     FoundRecords found;
@@ -50,7 +50,7 @@ class VastStore : public MemoryStore {
   absl::StatusOr<FoundRecords> ListRecords(const std::string& prefix, const std::string& after,
                                            size_t most, RecordKinds kinds) override {
     EXPECT_TRUE(kinds.bodies && !kinds.hulls);
-    ++questions;
+    ++queries;
     FoundRecords found;
     found.revision = kHulls;
     found.more = true;
@@ -62,7 +62,7 @@ class VastStore : public MemoryStore {
     return found;
   }
 
-  std::atomic<uint64_t> questions = 0;
+  std::atomic<uint64_t> queries = 0;
   std::atomic<uint64_t> records = 0;
   std::atomic<bool> is_gone = false;
   // Number of pieces of each body.
@@ -125,7 +125,7 @@ class RegistryRecords : public ::testing::Test {
 
 TEST_F(RegistryRecords, TheStartReadsNothing) {
   Start(1000);
-  EXPECT_EQ(store_.questions, 0);
+  EXPECT_EQ(store_.queries, 0);
   EXPECT_EQ(registry_.Sizes().hull_count, VastStore::kHulls);
   EXPECT_EQ(registry_.Sizes().body_count, VastStore::kBodies);
   EXPECT_TRUE(registry_.has_bodies());
@@ -135,10 +135,10 @@ TEST_F(RegistryRecords, EachIsReadOnceAndManyAtATime) {
   Start(1000);
   ExpectThere(Ids(0, 512));
   EXPECT_EQ(store_.records, 512);
-  EXPECT_LE(store_.questions, 5);
-  const uint64_t questions = store_.questions;
+  EXPECT_LE(store_.queries, 5);
+  const uint64_t queries = store_.queries;
   ExpectThere(Ids(0, 512));
-  EXPECT_EQ(store_.questions, questions);
+  EXPECT_EQ(store_.queries, queries);
 }
 
 TEST_F(RegistryRecords, MissingRecordsAreCached) {
@@ -156,7 +156,7 @@ TEST_F(RegistryRecords, NonblockingReadsFailUntilTheRecordIsKnown) {
   Start(1000);
   const std::vector<std::string> ids = {"h1"};
   EXPECT_FALSE(registry_.Resolve(ids, {}, {.may_wait = false}).ok());
-  EXPECT_EQ(store_.questions, 0);
+  EXPECT_EQ(store_.queries, 0);
   ExpectThere(ids);
   EXPECT_TRUE(registry_.Resolve(ids, {}, {.may_wait = false}).ok());
 }
@@ -184,9 +184,9 @@ TEST_F(RegistryRecords, BodiesAreReadOnceAndManyAtATime) {
   Start(1000);
   ExpectBodies(Ids(0, 512, "b"));
   EXPECT_EQ(store_.records, 512);
-  EXPECT_EQ(store_.questions, 4);
+  EXPECT_EQ(store_.queries, 4);
   ExpectBodies(Ids(0, 512, "b"));
-  EXPECT_EQ(store_.questions, 4);
+  EXPECT_EQ(store_.queries, 4);
 }
 
 // A caller that looks for bodies among hulls learns the kind of every ID in one request.
@@ -194,13 +194,13 @@ TEST_F(RegistryRecords, MissingBodiesAreCached) {
   Start(1000);
   const std::vector<std::string> ids = {"h1", "b2", "none"};
   EXPECT_FALSE(registry_.records().FindBodies(ids, {}, false).status.ok());
-  EXPECT_EQ(store_.questions, 0);
+  EXPECT_EQ(store_.queries, 0);
   const FoundBodies found = registry_.records().FindBodies(ids);
   ASSERT_TRUE(found.status.ok()) << found.status;
   EXPECT_EQ(found.bodies[0], nullptr);
   EXPECT_NE(found.bodies[1], nullptr);
   EXPECT_EQ(found.bodies[2], nullptr);
-  EXPECT_EQ(store_.questions, 1);
+  EXPECT_EQ(store_.queries, 1);
   EXPECT_TRUE(registry_.records().FindBodies(ids, {}, false).status.ok());
   const absl::StatusOr<Resolved> resolved = registry_.Resolve(ids, {});
   ASSERT_TRUE(resolved.ok()) << resolved.status();
@@ -266,7 +266,7 @@ TEST_F(RegistryRecords, BodiesAreListedPageByPageWithoutBeingKept) {
     after = page->entries.back().record.hull_id;
   }
   EXPECT_EQ(after, "b59");
-  EXPECT_EQ(store_.questions, 10);
+  EXPECT_EQ(store_.queries, 10);
   EXPECT_FALSE(registry_.records().FindBodies(Ids(10, 1, "b"), {}, false).status.ok());
 }
 

@@ -61,7 +61,7 @@ class Recording {
       this.handlers.poses({scene, poses: this.state.poses});
       this.handlers.collisions(this.state.collisions);
     }
-    if (type !== 'question' || !pair) return;
+    if (type !== 'query' || !pair) return;
     const state = time === null ? this.state : states.find((each) => each.time === time);
     if (!state) return;
     if (state !== this.state) {

@@ -419,14 +419,14 @@ class Viewer {
         'Run hullctl view again for a new address.');
   }
 
-  // --- Questions ---
+  // --- Queries ---
 
   ask(rest) {
     const {model} = this;
     const objects = [...this.moved];
     this.moved.clear();
     this.connection.send({
-      type: 'question',
+      type: 'query',
       scene: model.number,
       update: ++this.update,
       objects,

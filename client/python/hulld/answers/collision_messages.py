@@ -157,7 +157,7 @@ def _analysis_of(message: Any) -> Analysis:
     )
 
 
-def decode_collision(data: bytes, question: Placements, viewer: Viewer | None) -> Collision:
+def decode_collision(data: bytes, query: Placements, viewer: Viewer | None) -> Collision:
     message = collision_pb2.CheckCollisionResponse.FromString(data)
 
     def part(name: str, read: Callable[[Any], T]) -> T | None:
@@ -181,7 +181,7 @@ def decode_collision(data: bytes, question: Placements, viewer: Viewer | None) -
         {hull.hull_id: version_of(hull) for hull in message.piece_hulls},
         part("normal", lambda m: Normal(_vector(m.direction), m.angle_bound)),
         part("first_contact", _contact_of),
-        question,
+        query,
         viewer,
     )
 

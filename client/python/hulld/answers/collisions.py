@@ -285,7 +285,7 @@ class Collision:
     piece_hulls: Mapping[str, HullVersion] = field(default_factory=dict)
     normal: Normal | None = None
     first_contact: FirstContact | None = None
-    _question: Placements | None = field(default=None, repr=False, compare=False)
+    _query: Placements | None = field(default=None, repr=False, compare=False)
     _viewer: Viewer | None = field(default=None, repr=False, compare=False)
 
     @property
@@ -323,7 +323,7 @@ class Collision:
             ("axis", self.axis and self.axis.direction),
         ]
         viewer = self._viewer or Viewer.absent("this answer did not come from a server")
-        return viewer.html(rows, self._question or Placements([]), [(0, 1)])
+        return viewer.html(rows, self._query or Placements([]), [(0, 1)])
 
 
 def _short(answer: Any, first: str, left_out: Sequence[str]) -> str:

@@ -62,7 +62,7 @@ class Containment:
         return "Containment({} inside, {} on, {} outside)".format(*counts)
 
 
-class PointQuestion:
+class PointQuery:
     """The points of a call, as pairs with a hull. Each point is the same inline shape, the origin,
     translated to the point, which is exact."""
 

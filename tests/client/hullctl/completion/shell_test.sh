@@ -125,7 +125,7 @@ EOF
     hullctl delete big >/dev/null
     hullctl create cell/stray >/dev/null
     printf 'prefix: cell/\nhulls:\n  table: {box: [1, 1, 1]}\n' >cell.yaml
-    contains "the question before a prune" "Delete 1 hull (cell/stray)? [y/N]" \
+    contains "the query before a prune" "Delete 1 hull (cell/stray)? [y/N]" \
       "$(on_terminal 'n\n' 'hullctl scene apply cell.yaml --prune')"
     expect "a no to a prune" "cell/stray" "$(hullctl list cell/ --output name)"
     contains "a yes to a prune" "cell/stray" "$(on_terminal 'y\n' 'hullctl scene apply cell.yaml --prune')"

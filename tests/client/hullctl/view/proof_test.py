@@ -60,16 +60,16 @@ class ProofTest(viewer_case.ViewerCase):
                                   for _ in range(count)])
         self.view("proof/a", "proof/b", "room/left", "room/right")
         record = pathlib.Path(self.hulld.directory, "record.json")
-        questions = [("proof/a", "proof/b", [random.gauss(0, 1) for _ in range(4)] +
+        queries = [("proof/a", "proof/b", [random.gauss(0, 1) for _ in range(4)] +
                       [random.gauss(0, far) for _ in range(3)], radius)
                      for far in (0.5, 0.5, 2, 4, 1e9) for radius in (0, 0.75)]
         # They share a face, an edge, or a corner; then they are 1.5 apart or 2.5.
-        questions += [("room/left", "room/right", [1, 0, 0, 0, *t], radius)
+        queries += [("room/left", "room/right", [1, 0, 0, 0, *t], radius)
                       for t, radius in (((-1, 0.3, 0), 0), ((-1, 1, 0), 0), ((-1, 1, -3), 0),
                                         ((0.5, 0.3, 0), 0.75), ((0.5, 3, 0), 1.25))]
         proven = refuted = 0
         relations = set()
-        for a, b, pose, radius in questions:
+        for a, b, pose, radius in queries:
             self.hulld.hullctl("check", a, b, "--certificate", "--record", str(record),
                                "--radius-a", repr(radius), "--radius-b", repr(radius),
                                "--pose-b", ",".join(map(repr, pose)))
@@ -95,7 +95,7 @@ class ProofTest(viewer_case.ViewerCase):
         self.view("rod", "ceiling", "box", "room/right", "table")
         record = pathlib.Path(self.hulld.directory, "motion.json")
         turn = "1,0,0,0,0,0,0 --to-a 1,0,0,1,0,0,0"
-        questions = [
+        queries = [
             # The tip of the rod meets the ceiling at half time, or passes 1/8 below it.
             ("rod", "ceiling", f"--pose-a {turn}"),
             ("rod", "ceiling", f"--pose-a {turn} --radius-b 0.125"),
@@ -114,10 +114,10 @@ class ProofTest(viewer_case.ViewerCase):
         for _ in range(6):
             poses = [",".join(repr(random.gauss(0, 1)) for _ in range(4)) + "," +
                      ",".join(repr(random.gauss(0, far)) for _ in range(3)) for far in (4, 2)]
-            questions.append(("box", "room/right", f"--pose-a {poses[0]} --to-a {poses[1]}"))
+            queries.append(("box", "room/right", f"--pose-a {poses[0]} --to-a {poses[1]}"))
         verdicts = {"": 0}
         relations = set()
-        for a, b, options in questions:
+        for a, b, options in queries:
             self.hulld.hullctl("check", a, b, "--certificate", "--record", str(record),
                                *options.split())
             honest = json.loads(record.read_text())

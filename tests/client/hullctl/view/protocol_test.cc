@@ -40,31 +40,31 @@ std::string ErrorOf(const std::string& json) {
   return std::string(message.status().message());
 }
 
-TEST(Protocol, QuestionsKeepEveryBitOfAPose) {
+TEST(Protocol, QueriesKeepEveryBitOfAPose) {
   const Pose7 pose = {0.1, -1e-308, 1e308, 5e-324, 1.0 / 3, -0.1, 12345678.900000001};
   const auto message = ParsePageMessage(
-      R"({"type":"question","scene":2,"update":7,"objects":[3],"poses":)" +
+      R"({"type":"query","scene":2,"update":7,"objects":[3],"poses":)" +
       NumbersJson(pose.data(), pose.size()) + R"(,"pair":[3,1],"tolerance":0.25,"rest":true})");
   ASSERT_TRUE(message.ok()) << message.status();
-  ASSERT_TRUE(message->question.has_value());
-  const ViewQuestion& question = *message->question;
-  EXPECT_EQ(question.scene, 2);
-  EXPECT_EQ(question.update, 7);
-  EXPECT_THAT(question.objects, ElementsAre(3));
-  ASSERT_EQ(question.poses.size(), 1);
+  ASSERT_TRUE(message->query.has_value());
+  const ViewQuery& query = *message->query;
+  EXPECT_EQ(query.scene, 2);
+  EXPECT_EQ(query.update, 7);
+  EXPECT_THAT(query.objects, ElementsAre(3));
+  ASSERT_EQ(query.poses.size(), 1);
   for (size_t i = 0; i < pose.size(); ++i) {
-    EXPECT_EQ(question.poses[0][i], pose[i]) << i;
+    EXPECT_EQ(query.poses[0][i], pose[i]) << i;
   }
-  ASSERT_TRUE(question.pair.has_value());
-  EXPECT_THAT(*question.pair, Pair(3, 1));
-  EXPECT_EQ(question.tolerance, 0.25);
-  EXPECT_TRUE(question.rest);
+  ASSERT_TRUE(query.pair.has_value());
+  EXPECT_THAT(*query.pair, Pair(3, 1));
+  EXPECT_EQ(query.tolerance, 0.25);
+  EXPECT_TRUE(query.rest);
 }
 
 TEST(Protocol, AQueryMayNameNoPairs) {
-  const auto message = ParsePageMessage(R"({"type":"question","update":1,"pair":[]})");
+  const auto message = ParsePageMessage(R"({"type":"query","update":1,"pair":[]})");
   ASSERT_TRUE(message.ok()) << message.status();
-  EXPECT_FALSE(message->question->pair.has_value());
+  EXPECT_FALSE(message->query->pair.has_value());
 }
 
 TEST(Protocol, GeometryRequestsAreRead) {
@@ -114,16 +114,15 @@ TEST(Protocol, MalformedMessagesAreRefused) {
   EXPECT_NE(ErrorOf("[]"), "");
   EXPECT_THAT(ErrorOf("{}"), HasSubstr("type"));
   EXPECT_THAT(ErrorOf(R"({"type":"delete"})"), HasSubstr("unknown to the bridge"));
-  EXPECT_THAT(ErrorOf(R"({"type":"question","objects":[0],"poses":[1,2,3]})"),
+  EXPECT_THAT(ErrorOf(R"({"type":"query","objects":[0],"poses":[1,2,3]})"),
               HasSubstr("seven numbers"));
-  EXPECT_THAT(ErrorOf(R"({"type":"question","objects":[-1],"poses":[1,0,0,0,0,0,0]})"),
+  EXPECT_THAT(ErrorOf(R"({"type":"query","objects":[-1],"poses":[1,0,0,0,0,0,0]})"),
               HasSubstr("not an index"));
-  EXPECT_THAT(ErrorOf(R"({"type":"question","objects":[0.5],"poses":[1,0,0,0,0,0,0]})"),
+  EXPECT_THAT(ErrorOf(R"({"type":"query","objects":[0.5],"poses":[1,0,0,0,0,0,0]})"),
               HasSubstr("not an index"));
-  EXPECT_THAT(ErrorOf(R"({"type":"question","pair":[4,4]})"),
-              HasSubstr("does not name two objects"));
-  EXPECT_THAT(ErrorOf(R"({"type":"question","update":-1})"), HasSubstr("whole number"));
-  EXPECT_THAT(ErrorOf(R"({"type":"question","tolerance":"much"})"), HasSubstr("not a number"));
+  EXPECT_THAT(ErrorOf(R"({"type":"query","pair":[4,4]})"), HasSubstr("does not name two objects"));
+  EXPECT_THAT(ErrorOf(R"({"type":"query","update":-1})"), HasSubstr("whole number"));
+  EXPECT_THAT(ErrorOf(R"({"type":"query","tolerance":"much"})"), HasSubstr("not a number"));
 }
 
 TEST(Protocol, FramesHoldHeadDoublesAndIndicesAligned) {

@@ -87,7 +87,7 @@ def test_many_points_go_in_calls_within_the_limits(
     assert len(found) == len(found.separations) == 1000
 
 
-def test_wrong_questions_are_named(either: Any, cube: str) -> None:
+def test_wrong_queries_are_named(either: Any, cube: str) -> None:
     with pytest.raises(hulld.NotFoundError, match=r'^NOT_FOUND: hull "absent" not found'):
         either.contains([(0, 0, 0)], "absent")
     with pytest.raises(ValueError, match=r"points\[1\].y is nan"):

@@ -204,10 +204,10 @@ TEST(LiveHull, QueriesPayForPreparation) {
     pose.t = Vector(random.Real(1.5, 1.9), 0, 0);
     ASSERT_TRUE(CheckCollision(PlacedHull(*version, Pose()), PlacedHull(query_probe, pose)).ok());
   };
-  int questions = 0;
-  for (; !growing.live.WantsPreparing(growing.mark) && questions < 100000; ++questions) ask();
-  EXPECT_GT(questions, 20);
-  EXPECT_LT(questions, 5000);
+  int queries = 0;
+  for (; !growing.live.WantsPreparing(growing.mark) && queries < 100000; ++queries) ask();
+  EXPECT_GT(queries, 20);
+  EXPECT_LT(queries, 5000);
   EXPECT_EQ(growing.live.points_moved(), 0u);
   growing.live.Prepare(growing.mark);
   EXPECT_EQ(growing.live.points_moved(), 500u);

@@ -21,7 +21,7 @@ namespace {
 // Pause between the polling reads of a client with an unanswered call, and their maximum number:
 // one minute.
 constexpr std::chrono::milliseconds kPause(5);
-constexpr int kMaxQuestions = 12'000;
+constexpr int kMaxQueries = 12'000;
 constexpr std::chrono::milliseconds kWhile(200);
 
 }  // namespace
@@ -125,9 +125,9 @@ void ManyServersTest::Call(size_t number, const Calls& calls, HullHistory& histo
                   : client.CallAtRandom(hull);
     if (!is_answered) {
       // Polls with reads only, so that the history holds few changes of unknown outcome.
-      int questions = 0;
+      int queries = 0;
       do {
-        if (++questions == kMaxQuestions) {
+        if (++queries == kMaxQueries) {
           ADD_FAILURE() << "no server answers client " << number << ", seed " << calls.seed;
           return answered();
         }

@@ -1,5 +1,5 @@
-#ifndef HULLD_TESTS_BENCH_TRADE_TRADE_QUESTIONS_H_
-#define HULLD_TESTS_BENCH_TRADE_TRADE_QUESTIONS_H_
+#ifndef HULLD_TESTS_BENCH_TRADE_TRADE_QUERIES_H_
+#define HULLD_TESTS_BENCH_TRADE_TRADE_QUERIES_H_
 
 #include <cstddef>
 #include <deque>
@@ -20,7 +20,7 @@ namespace hulld::bench {
 // Half of the pairs are at the origin, where translations are finest, and half are about 100 radii
 // away from it, as in a scene. Every method receives the same geometry: random rotations are
 // rounded into the points, and a pose is an exact translation.
-struct TradeQuestions {
+struct TradeQueries {
   static constexpr size_t kLevels = 15;
 
   struct Range {
@@ -37,7 +37,7 @@ struct TradeQuestions {
 };
 
 // Requires: at least one hull, none empty. Fixed seeds.
-TradeQuestions MakeTradeQuestions(const std::vector<Hull>& hulls, size_t per_level);
+TradeQueries MakeTradeQueries(const std::vector<Hull>& hulls, size_t per_level);
 
 // Returns the hulls used if the user has none: ellipsoids of 64 points, boxes, and prisms of 12
 // sides.
@@ -45,4 +45,4 @@ std::vector<Hull> MakeOwnHulls();
 
 }  // namespace hulld::bench
 
-#endif  // HULLD_TESTS_BENCH_TRADE_TRADE_QUESTIONS_H_
+#endif  // HULLD_TESTS_BENCH_TRADE_TRADE_QUERIES_H_

@@ -1,4 +1,4 @@
-#include "tests/bench/trade/trade_questions.h"
+#include "tests/bench/trade/trade_queries.h"
 
 #include <cmath>
 #include <cstdlib>
@@ -43,7 +43,7 @@ constexpr Level kOrdinary[] = {{0.5, 2}, {0.01, 0.05}, {1e-3, 1e-3}, {0, 0, 0.5}
 constexpr Level kNearContact[] = {
     {-1e-6, -1e-6}, {1e-6, 1e-6},     {-1e-9, -1e-9}, {1e-9, 1e-9},    {-1e-12, -1e-12},
     {1e-12, 1e-12}, {-1e-15, -1e-15}, {1e-15, 1e-15}, {0, 0, 0, true}, {0, 0, 0, false}};
-static_assert(std::size(kOrdinary) + std::size(kNearContact) == TradeQuestions::kLevels);
+static_assert(std::size(kOrdinary) + std::size(kNearContact) == TradeQueries::kLevels);
 // The last two of the ordinary levels, and the first near contact.
 constexpr size_t kFirstDepthLevel = 3;
 constexpr size_t kDepthLevels = 3;
@@ -75,37 +75,37 @@ Vector Place(const QueryHull& a, const Vector& t_WA, const QueryHull& b, const L
 
 }  // namespace
 
-TradeQuestions MakeTradeQuestions(const std::vector<Hull>& hulls, size_t per_level) {
+TradeQueries MakeTradeQueries(const std::vector<Hull>& hulls, size_t per_level) {
   constexpr size_t kOrientations = 32;
   constexpr double kRadiiFromOrigin = 100;
-  TradeQuestions questions;
+  TradeQueries queries;
   Random random(kSeed);
   const size_t count = std::max(kOrientations, hulls.size());
   std::deque<QueryHull> query_hulls;
   double radii = 0;
   for (size_t i = 0; i < count; ++i) {
-    questions.hulls.push_back(Rotated(hulls[i % hulls.size()], random.Rotation()));
-    query_hulls.emplace_back(questions.hulls.back());
+    queries.hulls.push_back(Rotated(hulls[i % hulls.size()], random.Rotation()));
+    query_hulls.emplace_back(queries.hulls.back());
     radii += query_hulls.back().radius();
   }
-  questions.size = radii / static_cast<double>(count);
+  queries.size = radii / static_cast<double>(count);
   const auto add = [&](const Level& level) {
     for (size_t i = 0; i < per_level; ++i) {
       const size_t a = random.Below(count);
       const size_t b = random.Below(count);
       Pose X_WA;
-      if (i % 2 == 1) X_WA.t = kRadiiFromOrigin * questions.size * random.UnitVector();
+      if (i % 2 == 1) X_WA.t = kRadiiFromOrigin * queries.size * random.UnitVector();
       Pose X_WB;
       X_WB.t = Place(query_hulls[a], X_WA.t, query_hulls[b], level, random);
-      questions.queries.push_back({a, b, X_WA, X_WB});
+      queries.queries.push_back({a, b, X_WA, X_WB});
     }
   };
   for (const Level& level : kOrdinary) add(level);
   for (const Level& level : kNearContact) add(level);
-  questions.ordinary = {0, std::size(kOrdinary) * per_level};
-  questions.near_contact = {questions.ordinary.count, std::size(kNearContact) * per_level};
-  questions.depth = {kFirstDepthLevel * per_level, kDepthLevels * per_level};
-  return questions;
+  queries.ordinary = {0, std::size(kOrdinary) * per_level};
+  queries.near_contact = {queries.ordinary.count, std::size(kNearContact) * per_level};
+  queries.depth = {kFirstDepthLevel * per_level, kDepthLevels * per_level};
+  return queries;
 }
 
 std::vector<Hull> MakeOwnHulls() {

@@ -33,12 +33,12 @@ struct Asker {
 };
 using Askers = std::vector<Asker>;
 
-constexpr int kQuestionHulls = 16;
-std::string QuestionHull(uint64_t i) { return "questions/" + std::to_string(i % kQuestionHulls); }
+constexpr int kQueryHulls = 16;
+std::string QueryHull(uint64_t i) { return "queries/" + std::to_string(i % kQueryHulls); }
 
-void MakeQuestionHulls(const ChildServer& server) {
+void MakeQueryHulls(const ChildServer& server) {
   const auto hulls = v1::HullService::NewStub(ConnectAlone(server.address()));
-  for (int i = 0; i < kQuestionHulls; ++i) MakeBallHull(*hulls, QuestionHull(i), kVertices, 1);
+  for (int i = 0; i < kQueryHulls; ++i) MakeBallHull(*hulls, QueryHull(i), kVertices, 1);
 }
 
 Asker MakeAsker(const std::string& address, bool bounded, int seed) {
@@ -52,7 +52,7 @@ Asker MakeAsker(const std::string& address, bool bounded, int seed) {
   for (int i = 0; i < kRequests; ++i) {
     v1::CheckCollisionRequest& request = asker.requests.emplace_back();
     for (v1::Placement* placement : {request.mutable_a(), request.mutable_b()}) {
-      placement->set_hull_id(QuestionHull(random()));
+      placement->set_hull_id(QueryHull(random()));
       v1::Quaternion* const q = placement->mutable_pose()->mutable_rotation();
       q->set_w(1.5 + unit(random));
       q->set_x(unit(random));
@@ -126,7 +126,7 @@ Subject MakeSubject(const Arguments& arguments, const std::string& name, const C
 
 }  // namespace
 
-void MeasureQuestions(const Arguments& arguments) {
+void MeasureQueries(const Arguments& arguments) {
   const double turn = arguments.clients == 1 ? 0.5 : 1;
   const Stores stores(arguments);
   std::vector<std::unique_ptr<ChildServer>> servers;
@@ -136,7 +136,7 @@ void MeasureQuestions(const Arguments& arguments) {
     const bool is_floor = kind == "gRPC alone";
     servers.push_back(is_floor ? stores.StartFloor() : stores.StartEmpty(kind));
     const ChildServer& server = *servers.back();
-    if (!is_floor) MakeQuestionHulls(server);
+    if (!is_floor) MakeQueryHulls(server);
     for (const bool bounded : {true, false}) {
       if (!bounded && (is_floor || kind == "one")) continue;
       const std::string name = is_floor ? kind : kind + (bounded ? " bounded" : " linearizable");
@@ -147,8 +147,8 @@ void MeasureQuestions(const Arguments& arguments) {
   // The read index of --postgres-servers many, by libpq alone.
   std::unique_ptr<LibpqFloor> floor;
   if (arguments.clients == 1) {
-    floor = stores.MakeLibpqFloor("many", "bench_libpq_questions");
-    subjects.push_back({.name = "libpq question", .run = [&] {
+    floor = stores.MakeLibpqFloor("many", "bench_libpq_queries");
+    subjects.push_back({.name = "libpq query", .run = [&] {
                           std::vector<double> taken;
                           const Clock::time_point begin = Clock::now();
                           while (Since(begin) < turn) {
@@ -170,7 +170,7 @@ void MeasureBounded(const Arguments& arguments) {
   for (const std::string name : {"rocksdb", "rocksdb again", "one", "many"}) {
     servers.push_back(name == "rocksdb again" ? stores.StartEmpty("rocksdb", "bench_again")
                                               : stores.StartEmpty(name));
-    MakeQuestionHulls(*servers.back());
+    MakeQueryHulls(*servers.back());
     peer_of[name] = "rocksdb";
     subjects.push_back(MakeSubject(arguments, name, *servers.back(), true, kTurn));
   }

@@ -58,27 +58,27 @@ absl::Status EncodeAnswer(const hulld::Answer& answer, const QueryHull& a, const
 
 // A CheckCollision call for two placements, answered in slices (PairSearch). Used by one thread at
 // a time.
-class PairQuestion : public std::enable_shared_from_this<PairQuestion> {
+class PairQuery : public std::enable_shared_from_this<PairQuery> {
  public:
   // Answers the call, which must be admitted.
   static void Start(const ServiceParts& parts, CheckCall* call) {
     parts.pool.NoteSingleCall();
-    const std::shared_ptr<PairQuestion> question(new PairQuestion(parts, call));
-    if (absl::Status s = question->ReadRequest(); !s.ok()) return call->End(s);
-    if (question->TryAnswer()) return;
+    const std::shared_ptr<PairQuery> query(new PairQuery(parts, call));
+    if (absl::Status s = query->ReadRequest(); !s.ok()) return call->End(s);
+    if (query->TryAnswer()) return;
     // A store with peer servers is queried first. No thread waits for its reply.
-    const auto answer = [question](const absl::Status& status) {
-      if (!status.ok()) return question->call_->End(status);
-      const bool may_answer = question->parts_.waiting.count() < kMaxAnsweredInTurn;
-      if (!may_answer || !question->TryAnswer()) question->AnswerLater();
+    const auto answer = [query](const absl::Status& status) {
+      if (!status.ok()) return query->call_->End(status);
+      const bool may_answer = query->parts_.waiting.count() < kMaxAnsweredInTurn;
+      if (!may_answer || !query->TryAnswer()) query->AnswerLater();
     };
-    const bool waits = parts.waiting.AwaitFresh(parts.registry, question->plan_.freshness,
-                                                question->options_.should_stop, answer);
-    if (!waits) question->AnswerLater();
+    const bool waits = parts.waiting.AwaitFresh(parts.registry, query->plan_.freshness,
+                                                query->options_.should_stop, answer);
+    if (!waits) query->AnswerLater();
   }
 
  private:
-  PairQuestion(const ServiceParts& parts, CheckCall* call)
+  PairQuery(const ServiceParts& parts, CheckCall* call)
       : parts_(parts), call_(call), charge_(parts.registry.memory(), MemoryUse::kReading) {}
 
   // Reads everything except the hulls.
@@ -240,7 +240,7 @@ class PairQuestion : public std::enable_shared_from_this<PairQuestion> {
 UnaryReactor* StartCheck(CallContext& context, const ServiceParts& parts, const Bytes& request,
                          Bytes* response) {
   return CheckCall::Start(&context, parts.admission, Rpc::kCheckCollision, &request, response,
-                          [&parts](CheckCall* call) { PairQuestion::Start(parts, call); });
+                          [&parts](CheckCall* call) { PairQuery::Start(parts, call); });
 }
 
 }  // namespace hulld::server

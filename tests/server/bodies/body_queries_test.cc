@@ -9,13 +9,13 @@
 #include "tests/server/bodies/body_fixture.h"
 
 namespace hulld::server {
-namespace body_questions_test {
+namespace body_queries_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::Optional;
 
-class BodyQuestions : public BodyTest {
+class BodyQueries : public BodyTest {
  protected:
   // Returns the merged answer of a batch.
   absl::StatusOr<v1::BatchCheckCollisionsResponse> Batch(
@@ -31,7 +31,7 @@ class BodyQuestions : public BodyTest {
   }
 };
 
-TEST_F(BodyQuestions, TheAnswerNamesThePieceThatDecided) {
+TEST_F(BodyQueries, TheAnswerNamesThePieceThatDecided) {
   PutPair("pair");
   const auto overlap = Ask(PlacementOf("cube", 5.5, 0.5, 0.5), PlacementOf("pair"));
   ASSERT_TRUE(overlap.ok()) << overlap.status();
@@ -48,7 +48,7 @@ TEST_F(BodyQuestions, TheAnswerNamesThePieceThatDecided) {
   EXPECT_FALSE(apart->has_piece_a());
 }
 
-TEST_F(BodyQuestions, DetailsBelongToTheNearestOrDeepestPair) {
+TEST_F(BodyQueries, DetailsBelongToTheNearestOrDeepestPair) {
   PutPair("pair");
   v1::Wanted wanted;
   wanted.set_separation(true);
@@ -74,7 +74,7 @@ TEST_F(BodyQuestions, DetailsBelongToTheNearestOrDeepestPair) {
 }
 
 // Two cubes of one rotated body share a face: only the exact product of the poses shows it.
-TEST_F(BodyQuestions, PosesComposeExactly) {
+TEST_F(BodyQueries, PosesComposeExactly) {
   Put("cube", Cube());
   ASSERT_TRUE(PutBody("left", {PlacementOf("cube", 0.25, 0.2, 0.3)}).ok());
   ASSERT_TRUE(PutBody("right", {PlacementOf("cube", 1.25, 0.2, 0.3)}).ok());
@@ -89,7 +89,7 @@ TEST_F(BodyQuestions, PosesComposeExactly) {
   EXPECT_EQ(Ask(left, right)->relation(), v1::RELATION_TOUCHING);
 }
 
-TEST_F(BodyQuestions, TheTextbookMethodIsOnlyForHulls) {
+TEST_F(BodyQueries, TheTextbookMethodIsOnlyForHulls) {
   PutPair("pair");
   v1::CheckCollisionRequest request;
   *request.mutable_a() = PlacementOf("pair");
@@ -98,7 +98,7 @@ TEST_F(BodyQuestions, TheTextbookMethodIsOnlyForHulls) {
   EXPECT_TRUE(absl::IsInvalidArgument(MakeClient().CheckCollision(request).status()));
 }
 
-TEST_F(BodyQuestions, AMissingPieceIsNamedUntilItExists) {
+TEST_F(BodyQueries, AMissingPieceIsNamedUntilItExists) {
   Put("cube", Cube());
   ASSERT_TRUE(PutBody("b", {PlacementOf("cube"), PlacementOf("late", 5, 0, 0)}).ok());
   const auto missing = Ask(PlacementOf("b"), PlacementOf("cube", 9, 0, 0));
@@ -121,7 +121,7 @@ TEST_F(BodyQuestions, AMissingPieceIsNamedUntilItExists) {
               HasSubstr("is a body; this call requires a hull"));
 }
 
-TEST_F(BodyQuestions, APieceUsesTheCurrentVersionOfItsHull) {
+TEST_F(BodyQueries, APieceUsesTheCurrentVersionOfItsHull) {
   PutPair("pair");
   EXPECT_EQ(Ask(PlacementOf("pair"), PlacementOf("cube", 2.5, 0, 0))->relation(),
             v1::RELATION_SEPARATED);
@@ -134,7 +134,7 @@ TEST_F(BodyQuestions, APieceUsesTheCurrentVersionOfItsHull) {
   EXPECT_EQ(grown->piece_a().index(), 0u);
 }
 
-TEST_F(BodyQuestions, BatchesAcceptHullsAndBodies) {
+TEST_F(BodyQueries, BatchesAcceptHullsAndBodies) {
   PutPair("pair");
   ASSERT_TRUE(PutBody("broken", {PlacementOf("nothing")}).ok());
   v1::BatchCheckCollisionsRequest request;
@@ -185,7 +185,7 @@ TEST_F(BodyQuestions, BatchesAcceptHullsAndBodies) {
               HasSubstr("METHOD_TEXTBOOK_SAT applies to pairs of hulls, not of bodies"));
 }
 
-TEST_F(BodyQuestions, WithoutBodiesThePiecesColumnIsAbsent) {
+TEST_F(BodyQueries, WithoutBodiesThePiecesColumnIsAbsent) {
   Put("cube", Cube());
   v1::BatchCheckCollisionsRequest request;
   *request.add_placements() = PlacementOf("cube");
@@ -194,7 +194,7 @@ TEST_F(BodyQuestions, WithoutBodiesThePiecesColumnIsAbsent) {
   EXPECT_EQ(Batch(request)->columns().pieces_size(), 0);
 }
 
-TEST_F(BodyQuestions, ScenesAcceptHullsAndBodies) {
+TEST_F(BodyQueries, ScenesAcceptHullsAndBodies) {
   PutPair("pair");
   v1::FindCollisionsRequest request;
   *request.add_placements() = PlacementOf("pair");
@@ -218,7 +218,7 @@ TEST_F(BodyQuestions, ScenesAcceptHullsAndBodies) {
   EXPECT_EQ(all.totals().pairs(), 6u);
 }
 
-TEST_F(BodyQuestions, StreamsMoveAndRefreshBodies) {
+TEST_F(BodyQueries, StreamsMoveAndRefreshBodies) {
   PutPair("pair");
   Put("probe", Cube());
   v1::CollisionStreamOpen open;
@@ -258,7 +258,7 @@ TEST_F(BodyQuestions, StreamsMoveAndRefreshBodies) {
   EXPECT_TRUE(stream->Close().ok());
 }
 
-TEST_F(BodyQuestions, ALongQueryEndsAtItsDeadline) {
+TEST_F(BodyQueries, ALongQueryEndsAtItsDeadline) {
   Put("sphere", Sphere(2000));
   std::vector<v1::Placement> pieces;
   for (int i = 0; i < 3000; ++i) {
@@ -278,5 +278,5 @@ TEST_F(BodyQuestions, ALongQueryEndsAtItsDeadline) {
   TearDown();
 }
 
-}  // namespace body_questions_test
+}  // namespace body_queries_test
 }  // namespace hulld::server
