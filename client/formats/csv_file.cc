@@ -179,7 +179,7 @@ absl::Status CheckFirstRow(ByteSource* source, std::string_view row, std::option
   return source->ErrorAtLine(
       absl::StrCat(Quoted(row),
                    " may be a point, or a header that numbers the columns, as pandas "
-                   "writes it; replace a header by x,y,z; put x,y,z above a point"));
+                   "writes it; replace it with x,y,z if it is a header, or insert x,y,z above it"));
 }
 
 std::optional<CsvLayout> CsvHeaderInComment(const ByteSource& source, std::string_view line,

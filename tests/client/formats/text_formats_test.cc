@@ -249,7 +249,7 @@ TEST(CsvFile, AHeaderThatMayBeAPointIsAnError) {
   }
   EXPECT_EQ(ReadText("0,1,2\n0.5,1.5,2.5\n", PointFormat::kCsv).error(),
             "FILE:1: \"0,1,2\" may be a point, or a header that numbers the columns, as pandas "
-            "writes it; replace a header by x,y,z; put x,y,z above a point");
+            "writes it; replace it with x,y,z if it is a header, or insert x,y,z above it");
 }
 
 TEST(CsvFile, ARowOfNumbersThatIsNoHeaderIsAPoint) {

@@ -462,11 +462,11 @@ std::vector<SeedFile> SeedFiles() {
       {FileKind::kPly,
        "ply\nformat binary_little_endian 1.0\nelement a 2\nproperty list uchar uchar l\n"
        "element vertex 2\nproperty float x\nproperty float y\nproperty float z\nend_header\n" +
-           std::string("\x02zz\x00", 4) + packed},
+           std::string("\x02zz\x00", 4) + packed.substr(0, 24)},
       {FileKind::kPly,
        "ply\nformat binary_big_endian 1.0\nelement vertex 2\nproperty double x\nproperty short y\n"
        "property uint z\nend_header\n" +
-           packed},
+           packed.substr(0, 28)},
       {FileKind::kXyz, "1 2 3\n4\t5 6 255 0 0\n\n# c\n-0 1e308 5e-324\n"},
       {FileKind::kCsv, "t,x,y,\"z\"\n0,1,2,3\n1,\"4\",5,6\n"},
       {FileKind::kCsv, "1;2;3\n4;5;6\n"},
