@@ -1,8 +1,10 @@
 #include "tests/bench/csv_reporter.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <fstream>
+#include <iterator>
 #include <map>
 #include <thread>
 
@@ -88,33 +90,35 @@ std::string CompilerName() { return kCompiler; }
 
 bool CsvReporter::ReportContext(const Context&) { return true; }
 
-void CsvReporter::WriteHeader(const Run& run) {
-  GetOutputStream() << "workload,library";
-  for (const char* counter : kCounters) {
-    if (!run.counters.contains(counter)) continue;
-    columns_.push_back(counter);
-    GetOutputStream() << "," << counter;
-  }
-  GetOutputStream() << ",milliseconds,compiler,cpu\n";
+void CsvReporter::ReportRuns(const std::vector<Run>& runs) {
+  std::copy_if(runs.begin(), runs.end(), std::back_inserter(rows_), IsFinal);
 }
 
-void CsvReporter::ReportRuns(const std::vector<Run>& runs) {
-  static const std::string kCpu = CpuName();
-  for (const Run& run : runs) {
-    if (!IsFinal(run)) continue;
-    if (columns_.empty()) WriteHeader(run);
-    std::ostream& out = GetOutputStream();
-    out << WorkloadAndLibrary(run.run_name.function_name);
-    for (const std::string& column : columns_) {
+void CsvReporter::Finalize() {
+  std::vector<std::string> columns;
+  std::copy_if(std::begin(kCounters), std::end(kCounters), std::back_inserter(columns),
+               [&](const char* counter) {
+                 return std::any_of(rows_.begin(), rows_.end(),
+                                    [&](const Run& row) { return row.counters.contains(counter); });
+               });
+  std::ostream& out = GetOutputStream();
+  out << "workload,library";
+  for (const std::string& column : columns) out << "," << column;
+  out << ",milliseconds,compiler,cpu\n";
+  const std::string cpu = CpuName();
+  for (const Run& row : rows_) {
+    out << WorkloadAndLibrary(row.run_name.function_name);
+    for (const std::string& column : columns) {
       out << ",";
-      if (const auto found = run.counters.find(column); found != run.counters.end()) {
+      if (const auto found = row.counters.find(column); found != row.counters.end()) {
         Write(out, found->second.value);
       }
     }
-    const bool is_cpu_time = run.run_name.time_type.empty();
-    out << "," << (is_cpu_time ? run.GetAdjustedCPUTime() : run.GetAdjustedRealTime()) << ","
-        << kCompiler << "," << kCpu << std::endl;
+    const bool is_cpu_time = row.run_name.time_type.empty();
+    out << "," << (is_cpu_time ? row.GetAdjustedCPUTime() : row.GetAdjustedRealTime()) << ","
+        << kCompiler << "," << cpu << "\n";
   }
+  out.flush();
 }
 
 int RunBenchmarks(int argc, char** argv) {

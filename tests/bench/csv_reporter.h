@@ -16,12 +16,11 @@ class CsvReporter : public benchmark::BenchmarkReporter {
  public:
   bool ReportContext(const Context& context) override;
   void ReportRuns(const std::vector<Run>& runs) override;
+  // Writes the file: rows may have different counters, so that the columns are known only now.
+  void Finalize() override;
 
  private:
-  void WriteHeader(const Run& run);
-
-  // Names of the counters in the first row; all rows have the same.
-  std::vector<std::string> columns_;
+  std::vector<Run> rows_;
 };
 
 // Columns of every file: the compiler of the benchmark, and its machine.

@@ -240,7 +240,7 @@ function touching(   s, p, n, key) {
 }
 
 # Returns percent of all, or "0".
-function share(part, all) { return part == 0 ? "0" : sprintf("%.2g %%", 100 * part / all) }
+function share(part, all) { return part == "" ? "not counted" : part == 0 ? "0" : sprintf("%.2g %%", 100 * part / all) }
 
 function lengths(query,   s, p, n, m, key) {
   read_rows("query_" query "_" machine)
