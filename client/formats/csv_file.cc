@@ -163,16 +163,17 @@ absl::StatusOr<std::optional<CsvLayout>> CsvHeader(const ByteSource& source, std
   return layout;
 }
 
-absl::Status CheckFirstRow(ByteSource* source, std::string_view row, std::optional<char> declared) {
-  const char separator = declared.value_or(SeparatorOf(row));
+absl::Status CheckFirstRow(ByteSource* source, std::string_view row,
+                           std::optional<char> separator) {
+  if (!separator) separator = SeparatorOf(row);
   std::vector<std::string_view> cells;
-  SplitRow(row, separator, &cells);
+  SplitRow(row, *separator, &cells);
   if (!AreNumbered(cells)) return absl::OkStatus();
   constexpr size_t kBytesOfRow = 4096;
   std::string_view next = source->Peek(kBytesOfRow);
   next.remove_prefix(std::min(next.find_first_not_of(" \t\r\n"), next.size()));
   next = next.substr(0, next.find_first_of("\r\n"));
-  SplitRow(next, separator, &cells);
+  SplitRow(next, *separator, &cells);
   if (IsCsvComment(next) || std::all_of(cells.begin(), cells.end(), IsInteger)) {
     return absl::OkStatus();
   }

@@ -4,6 +4,7 @@
 
 #include "core/query/collision.h"
 #include "core/query/floating/float_distance.h"
+#include "tests/core/checks/oracle_bridge.h"
 #include "tests/core/checks/point_sets.h"
 
 namespace hulld::float_search_test {
