@@ -25,8 +25,9 @@ bool IsMeshFormat(PointFormat format);
 
 // Reads the points of a file and passes them to `receive` in blocks, in file order, up to the first
 // error. Text is rounded to the nearest double; binary scalars are kept unchanged.
-// INVALID_ARGUMENT: a defect of the file, or no point in it; names the file, and the line or byte
-// of a defect. Errors of `receive` are returned unchanged.
+//
+// INVALID_ARGUMENT: the file is defective, or contains no points. The message names the file and,
+// for a defect, the line or byte. Errors of `receive` are returned unchanged.
 //
 // Points by format: obj: each `v` (weights and colors are ignored); off, ply, pcd, las: each
 // vertex; xyz, csv: the columns that the header names x, y, and z, or the first three; stl: each

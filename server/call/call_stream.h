@@ -18,10 +18,11 @@
 
 namespace hulld::server {
 
-// Base class of streaming calls. A call owns itself until gRPC releases it. It is admitted before
-// it does anything else, and finishes exactly once. `Reactor` is one of the reactors in
-// message_bytes.h. Of the two derived classes, PulledStream creates replies one at a time, and
-// QueuedStream queues them.
+// Base class of streaming calls: PulledStream creates each reply after the previous one is written,
+// QueuedStream queues replies. Reactor: a reactor of message_bytes.h.
+//
+// A call owns itself until gRPC releases it. It does nothing before it is admitted, and finishes
+// exactly once.
 template <typename Reactor>
 class CallStream : public Reactor, public std::enable_shared_from_this<CallStream<Reactor>> {
  public:

@@ -77,12 +77,13 @@ class CollisionStream:
     def update(
         self, placements: npt.ArrayLike, poses: PosesLike, *, refresh_hulls: bool = False
     ) -> StreamAnswer:
-        """Moves placements and returns the answers for every pair with a moved placement or, with
-        only_changes, for the pairs whose relation changed.
+        """Moves placements. Returns the answers for all pairs with a moved placement or, with
+        only_changes, for those pairs that changed their relation.
 
-        placements: k distinct indices into the placements of the stream. poses: their new poses,
-        k x 7, k x 4 x 4, or k x 3. refresh_hulls: look up every hull again before answering; a
-        placement whose hull changed counts as moved.
+        placements: k distinct indices into the placements of the stream.
+        poses: the new poses, k x 7, k x 4 x 4, or k x 3.
+        refresh_hulls: look up all hulls again first. If a hull changed, its placements count as
+        moved.
 
         ValueError: an index is out of range, a pose is malformed, or there are not k poses. Nothing
         was sent, and the stream remains usable. HulldError: the stream has ended; all later calls

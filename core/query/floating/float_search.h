@@ -25,6 +25,7 @@ struct FloatSearchResult {
   uint64_t directions_tried = 0;
 };
 
+// A `max_error` that ends a search at the sign of the separation.
 inline constexpr double kEndsAtSign = -1;
 
 // Walks toward the point of A - B that is nearest to the origin (Gilbert, Johnson and Keerthi

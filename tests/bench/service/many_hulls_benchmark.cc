@@ -1,11 +1,13 @@
-// Memory of many small hulls in the registry, and the time to look each of them up.
+// Measures the memory of many small hulls in the registry, and the time to look up each of them.
 //
 //   many_hulls_benchmark [--hulls N] [DIRECTORY]
 //
-// Creates N boxes (default 100000), in memory or in a RocksDB store in a new DIRECTORY. Prints a
-// CSV row for each step: heap per hull after it, bytes per hull that count against --memory-limit,
-// processor time of this process per hull, and resident memory. A query resolves all hulls in one
-// call, as a batch that names each once; `idle` is what the server does every ten seconds.
+// Creates N boxes (default 100000), in memory or in a RocksDB store in a new DIRECTORY, and queries
+// them. A query resolves all hulls in one call, like a batch that names each hull once. The step
+// `idle` does what the server does every ten seconds.
+//
+// Prints a CSV row after each step: the heap and the bytes that count against --memory-limit, each
+// per hull; the processor time of this process per hull; and the resident memory.
 
 #include <malloc.h>
 #include <unistd.h>
