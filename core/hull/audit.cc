@@ -132,8 +132,8 @@ struct SharedEdge {
   Side right;
 };
 
-// Returns every side by tail and head, with the opposite side of the neighboring facet: the one at
-// the same position in the order by head and tail.
+// Returns every side, sorted by tail and head, with the opposite side of the neighboring facet,
+// which is at the same position in the order by head and tail.
 absl::StatusOr<std::vector<SharedEdge>> CheckManifold(const Hull& hull, StopPoll& poll) {
   const size_t count = hull.vertices().size();
   std::vector<Side> sides;
