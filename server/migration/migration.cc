@@ -14,7 +14,7 @@
 namespace hulld::server {
 namespace {
 
-// Limits of a transaction: vertices (24 MB), or changes of hulls and bodies. A choice.
+// Limits of a transaction: vertices (24 MB), or changes of hulls and bodies. Not tuned.
 constexpr size_t kMaxVertices = 1'000'000;
 constexpr size_t kMaxChanges = 1000;
 

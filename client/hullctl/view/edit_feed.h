@@ -21,8 +21,8 @@ namespace hulld {
 // Hulls take turns in the order of their oldest edits. Not thread-safe.
 class EditQueue {
  public:
-  // Maximum number of pending coordinates, about 100 MB. A choice: one message of a page has at
-  // most 4 MiB (BridgeOptions::max_message_bytes).
+  // Maximum number of pending coordinates, about 100 MB. A message of a page has at most 4 MiB
+  // (BridgeOptions::max_message_bytes). Not tuned.
   static constexpr size_t kMaxNumbers = size_t{12} << 20;
 
   // Returns true if the edit was accepted: the queue had room.
