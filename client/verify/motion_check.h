@@ -22,10 +22,10 @@ double MaxTimeError(const v1::Wanted& wanted);
 
 // Returns OK if the intervals prove that A and B are separated up to contact.separated_until, and
 // the certificate proves their contact at contact.contact_time; for SEPARATED, if the intervals
-// cover the motion. Otherwise FAILED_PRECONDITION with the missing proof. OUT_OF_RANGE: all is
-// proven, but the two times are more than max_time_error apart, which the contract allows if the
-// pair is nearly in contact in between. Exact, from the definitions in the proto files alone, like
-// CheckCertificate.
+// cover the motion. Otherwise FAILED_PRECONDITION with the missing proof. OUT_OF_RANGE: everything
+// is proven, but the two times are more than max_time_error apart, which the contract allows if the
+// pair is nearly in contact in between. Like CheckCertificate, the check is exact and follows from
+// the definitions in the proto files alone.
 //
 // For a translation without radii, the certificate proves contact at contact_time, or between
 // separated_until and contact_time; that a TOUCHING pair never overlaps, or that an OVERLAPPING

@@ -296,8 +296,8 @@ absl::Status RefuseConflicts(const PairArguments& arguments) {
   return absl::OkStatus();
 }
 
-// Returns the error. If the server does not know an ID that looks like the name of a file, adds why
-// no file of that name was read.
+// Returns the error. If an unknown ID looks like a file name, adds an explanation why no file of
+// that name was read.
 absl::Status WithFileHint(const absl::Status& error, const PairArguments& arguments) {
   for (const std::string& name : {arguments.a, arguments.b}) {
     const std::string missing = absl::StrCat("hull ", Quoted(name), " not found");

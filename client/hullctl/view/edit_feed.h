@@ -43,9 +43,9 @@ class EditQueue {
   size_t numbers_ = 0;
 };
 
-// Applies the edits of a page, each hull's edits in order, on its own thread, and reports the
-// result of each edit to the page. The new hull arrives through the watch. Pending edits may be
-// merged (EditQueue). Thread-safe. Only for `hullctl view --edit`.
+// Applies the edits of a page on its own thread, those of each hull in order, and reports the
+// result of each edit to the page. The page receives the changed hull through the watch. Pending
+// edits may be merged (EditQueue). Thread-safe. Only for `hullctl view --edit`.
 class EditFeed {
  public:
   EditFeed(const Client& client, std::shared_ptr<PageChannel> page);
