@@ -31,7 +31,7 @@ namespace hulld::server {
 // A read waits only for the store: for the record of an unknown hull (RecordReader), and for points
 // that are not in memory. One reader loads a hull for all that request it
 // (RegisteredHull::is_loading). Other threads help a read that loads many hulls. A read finishes
-// its own loads before it waits for another read, because that one may be waiting for them.
+// its own loads before it waits for another read, because the other read may be waiting for them.
 //
 // Guarded by the registry's mutex, which this class acquires, and releases to wait and to prepare.
 class HullReader {
@@ -42,7 +42,7 @@ class HullReader {
   HullReader(const HullReader&) = delete;
   HullReader& operator=(const HullReader&) = delete;
 
-  // As Registry::Resolve, for a caller that repeatedly requests the same hulls: `known` persists
+  // Like Registry::Resolve, for a caller that repeatedly requests the same hulls: `known` persists
   // between calls, and only hulls changed since are looked up.
   absl::StatusOr<Resolved> Refresh(std::span<const std::string> ids, KnownHulls& known,
                                    const std::function<bool()>& should_stop,

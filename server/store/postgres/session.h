@@ -118,7 +118,7 @@ class Session {
   // Returns the payloads of the notices (LISTEN) received since the last call.
   std::vector<std::string> TakeNotices();
 
-  // As Ask for statements that commit. A warning counts as a loss: for example, the wait for a
+  // Like Ask for statements that commit. A warning counts as a loss: for example, the wait for a
   // standby was interrupted, so the transaction is committed, but not replicated as required.
   absl::StatusOr<std::vector<Rows>> AskToCommit(std::span<const Statement> statements);
   // Returns the version of the server: 150018 for 15.18.
