@@ -22,7 +22,7 @@ from hulld.verification.rational import (
     surrounds_origin,
 )
 
-#: How much a relation claims: more than those with lower numbers.
+#: The strength of a relation's claim.
 STRENGTH = {Relation.SEPARATED: 0, Relation.TOUCHING: 1, Relation.OVERLAPPING: 2}
 
 
