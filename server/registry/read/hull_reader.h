@@ -23,7 +23,7 @@ namespace hulld::server {
 // Returns hulls ready to be served, all at one revision.
 //
 // A read looks up kMaxLookupsPerHold hulls per hold of the mutex and releases it in between. At
-// the end, it looks up the hulls that have changed since, until one hold covers all remaining hulls:
+// the end, it looks up the hulls that have changed since, until one hold covers all that remain:
 // all hulls are then at one revision. This terminates, because a commit takes longer than a lookup.
 // Readers and writers never wait for each other: a reader gets the version of the committed state,
 // created in O(1), and never uses a builder.
