@@ -50,7 +50,7 @@ absl::StatusOr<std::vector<WriterSequence>> ReadWriters(Store& store, const Stor
   if (!writers.ok() || writers->size() == hull.writer_count) return writers;
   return absl::DataLossError(absl::StrCat("hull \"", hull.record.hull_id, "\" has ",
                                           writers->size(), " writers in store ", store.id(),
-                                          ", not ", hull.writer_count, " as its record says"));
+                                          ", not ", hull.writer_count, " as its record states"));
 }
 
 }  // namespace

@@ -449,7 +449,7 @@ void AddCheckCommand(Command program, Invocation* invocation) {
       "\n"
       "--to-a and --to-b define a motion, from time 0 to time 1, with quaternion and translation\n"
       "linear in time. Of the two quaternions of the end rotation, hullctl picks the one with the\n"
-      "shorter path. The relation covers all times, and contact is never missed.");
+      "shorter path. The relation covers all times, and no contact is missed.");
   command.SetExamples(
       {{"Do they collide?", "hullctl check arm box --pose-b 0.2,0,0"},
        {"How far apart are they, and where?",
