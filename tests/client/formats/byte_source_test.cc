@@ -38,7 +38,7 @@ TEST(ByteSource, SupportsThreeKindsOfLineEnds) {
   EXPECT_EQ(Lines(""), Strings{});
 }
 
-TEST(ByteSource, SkipsAUtf8Mark) {
+TEST(ByteSource, SkipsAUtf8ByteOrderMark) {
   EXPECT_EQ(Lines("\xEF\xBB\xBFx\ny"), (Strings{"x", "y"}));
   EXPECT_EQ(Lines("\xEF\xBB"), (Strings{"\xEF\xBB"}));
 }

@@ -476,7 +476,7 @@ TEST(LogEventTest, TextIsQuotedAndEscapedWhereNeeded) {
 }
 
 // A watcher of grpc.health.v1; Debian does not ship its generated code.
-TEST_F(Observation, WatchersOfHealthSeeTheServerDrain) {
+TEST_F(Observation, HealthWatchesReportTheDrain) {
   grpc::GenericStub stub(channel_);
   grpc::ClientContext context;
   grpc::CompletionQueue queue;

@@ -228,7 +228,7 @@ TEST_F(RegistryRecords, UnusedBodiesAreBoundedInBytes) {
 }
 
 // Otherwise it would be in memory twice.
-TEST_F(RegistryRecords, ABodyThatSomebodyHoldsStaysKnown) {
+TEST_F(RegistryRecords, ABodyInUseStaysCached) {
   Start(1);
   const std::vector<std::string> ids = {"b7"};
   const FoundBodies held = registry_.records().FindBodies(ids);

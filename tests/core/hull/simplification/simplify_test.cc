@@ -163,7 +163,7 @@ TEST(SimplifyTarget, NonsenseIsRefused) {
   }
 }
 
-TEST(SimplifyTarget, StopsWhenAsked) {
+TEST(SimplifyTarget, StopsOnRequest) {
   const Hull full = HullOf(Sphere(1000, 7));
   int polls = 0;
   const SimplifyTarget target = {500, 0, [&] { return ++polls > 10; }};
