@@ -37,7 +37,7 @@ absl::Status CheckFirstContact(v1::Relation relation, const v1::FirstContact& co
                                const v1::Certificate& at_contact, const MovingVertices& a,
                                const MovingVertices& b, double max_time_error);
 
-// Checks the first contact of two bodies likewise. a, b: all pieces of each body, in order. Every
+// Does the same for the first contact of two bodies. a, b: all pieces of each body, in order. Every
 // pair of nonempty pieces must have intervals up to contact.separated_until. If the bodies meet,
 // one pair must be in contact and have the relation of the bodies; for translations without radii,
 // it may be TOUCHING if the bodies are OVERLAPPING, because they may overlap later.

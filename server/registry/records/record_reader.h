@@ -58,7 +58,8 @@ class RecordReader : public PeerChangeListener, public PageSource {
   // or end of a hull is in flight. kQuiet: known, and nothing is in flight.
   enum class For { kLife, kQuiet };
   // Runs `task` when the changes committed by peer servers so far are applied and the ID is in that
-  // state; or refuses, without the mutex. The task may run again by `again`, which waits likewise.
+  // state; or refuses, without the mutex. The task may run again by `again`, which waits in the
+  // same way.
   using Task = std::function<void(Locked& locked, const LockedTask& again)>;
   void WhenReady(const std::string& id, For need, Refusal refuse, Task task);
 

@@ -36,7 +36,7 @@ absl::StatusOr<Conninfo> ParseConninfo(const std::string& text);
 // Encodes a bigint in PostgreSQL's binary format. Revisions and other numbers stay below 2^63.
 inline std::string EncodeBigint(uint64_t number) { return BigEndian(number); }
 inline uint64_t DecodeBigint(std::string_view bytes) { return FromBigEndian(bytes); }
-// Encodes an integer likewise.
+// Encodes an integer in the same way.
 inline std::string EncodeInteger(uint32_t number) { return BigEndian(number); }
 
 // A one-dimensional array in PostgreSQL's binary format.

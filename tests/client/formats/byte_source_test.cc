@@ -83,7 +83,7 @@ TEST(ByteSource, RefusesUtf16WithAdvice) {
 }
 
 TEST(ByteSource, LinesMayCrossTheBuffer) {
-  // Around the buffer's size, every split of CR LF between two reads occurs.
+  // Sizes around the buffer's cover every split of CR LF between two reads.
   for (size_t length = (256 << 10) - 4; length < (256 << 10) + 4; ++length) {
     const std::string first(length, 'a');
     EXPECT_EQ(Lines(first + "\r\nb\r\nc"), (Strings{first, "b", "c"})) << length;

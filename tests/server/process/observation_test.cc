@@ -69,7 +69,7 @@ class Observation : public ServerTest {
   // Returns the value of one series in Prometheus notation; -1 if missing.
   double Metric(const std::string& series) const { return ValueIn(Metrics(), series); }
 
-  // As Metric, in these metrics: values that must agree come from one collection.
+  // Like Metric, but in these metrics: values that must agree come from one collection.
   static double ValueIn(const std::string& metrics, const std::string& series) {
     std::istringstream lines(metrics);
     for (std::string line; std::getline(lines, line);) {

@@ -320,7 +320,7 @@ TEST(RegistryOfMemoryStore, MemoryHeldByCallsCountsUntilTheyEnd) {
   EXPECT_EQ(registry.Cache().bytes, 0);
 }
 
-// A batch that names every hull, of which only some fit into the readers' share.
+// A batch that names every hull, although only some fit into the readers' share.
 TEST_F(RegistryMemory, MoreColdHullsThanReadersMayHoldAreRefusedWhileAppendsContinue) {
   Limits limits;
   limits.memory_limit = 2 << 20;

@@ -173,7 +173,7 @@ TEST(DaeScene, ReferencesMustHaveOneTarget) {
   EXPECT_THAT(
       Error(DaeText("url=\"#scene\"", "url=\"#x\"")),
       HasSubstr("FILE:17: <instance_visual_scene> refers to \"#x\", the ID of no visual_scene"));
-  // A node may have the ID of a geometry; IDs may hold any characters.
+  // A node may have the ID of a geometry; IDs may contain any characters.
   std::string text = DaeText("<node id=\"plate\"", "<node id=\"plate-mesh\"");
   EXPECT_EQ(Error(text), "");
   text = DaeReplaced(text, "id=\"plate-mesh\"", "id=\"&lt;a b&quot;%20\"");

@@ -191,7 +191,8 @@ TEST(SimplifyTarget, StopsAtEveryStage) {
   }
 }
 
-// Counts polls, which follow the work. An error that needs nearly all vertices leaves no choice.
+// Counts polls, which are proportional to the work. An error that needs nearly all vertices leaves
+// no choice.
 TEST(SimplifyTarget, OutsideCostsFewTimesInsideForSmallErrors) {
   const Hull full = HullOf(Sphere(2000, 3));
   int polls = 0;
