@@ -32,7 +32,8 @@ class VertexSubset {
   // ChooseNext, this object may only be destroyed. Cost: O(points).
   VertexSubset(std::span<const Vector> points, std::span<const Vector> unit_points, StopPoll& poll);
   // Starts with the given vertices, without duplicates. Returns nothing if they lie in a plane or
-  // the poll stopped. Cost: as that many choices, for an order that is roughly farthest first.
+  // the poll stopped. Cost: that of as many calls of ChooseNext, if the order is roughly farthest
+  // first.
   static std::optional<VertexSubset> StartingWith(std::span<const uint32_t> start,
                                                   std::span<const Vector> points,
                                                   std::span<const Vector> unit_points,

@@ -270,7 +270,7 @@ TEST_F(RegistryRecords, BodiesAreListedPageByPageWithoutBeingKept) {
   EXPECT_FALSE(registry_.records().FindBodies(Ids(10, 1, "b"), {}, false).status.ok());
 }
 
-// The batch that says so does not wait, although the existing hulls are not read yet.
+// The batch that reports the restart does not wait, although the existing hulls are not read yet.
 TEST_F(RegistryRecords, AWatchThatCannotResumeReportsThatItRestarted) {
   Start(10);
   ChangeFeed& feed = registry_.feed();
