@@ -150,7 +150,7 @@ def check_pair(relation: Relation, certificate: Certificate, a: Piece, b: Piece)
             raise VerificationError("the direction does not separate: max n.A >= min n.B")
         return
     if n == ORIGIN or gap < 0:
-        raise VerificationError("the direction does not keep the insides apart: max n.A > min n.B")
+        raise VerificationError("the direction does not separate the interiors: max n.A > min n.B")
     if len(differences) > 4 or not holds_origin(differences):
         raise VerificationError("the vertex pairs show no common point")
 
