@@ -53,7 +53,8 @@ constexpr double kShortestStep = 0x1p-50;
 constexpr double kExactShare = 0x1p-36;
 constexpr double kPoorShare = 0x1p-8;
 // An exact direction is expensive: only this many trials of a step compute one at their end, and
-// steps below this length or this share of the last one, whichever is less, are abandoned. Not tuned.
+// steps below this length or this share of the last one, whichever is less, are abandoned. Not
+// tuned.
 constexpr int kMaxExactTrials = 10;
 constexpr double kShortestExactStep = 0x1p-40;
 constexpr double kShortestExactShare = 0x1p-12;
