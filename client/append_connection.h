@@ -14,9 +14,9 @@
 
 namespace hulld {
 
-// One AppendPoints stream, driven by one thread that never blocks past its deadline.
+// An AppendPoints stream, driven by a single thread that never blocks past its deadline.
 //
-// gRPC calls the On...Done functions on its own threads; they only record the event and wake the
+// gRPC calls the On...Done functions on its own threads. They only record the event and wake the
 // driving thread. A hold keeps the call open while the driving thread may still start writes.
 class AppendConnection final
     : public grpc::ClientBidiReactor<v1::AppendPointsRequest, v1::AppendPointsResponse> {
@@ -27,7 +27,7 @@ class AppendConnection final
 
   // Returns true if Write may be called.
   bool writable();
-  // Sends `request`, which is kept until gRPC has written it. Requires writable(): no write is in
+  // Sends `request`, and keeps it until gRPC has written it. Requires writable(): no write is in
   // flight (checked).
   void Write(std::shared_ptr<const v1::AppendPointsRequest> request);
   void WritesDone();

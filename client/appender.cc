@@ -229,8 +229,8 @@ absl::Status Appender::Finish() {
     v1::AppendPointsResponse ignored;
     if (!connection_->TakeResponse(&ignored) && !connection_->WaitForEvent(false, deadline)) break;
   }
-  // Everything is acknowledged, so it does not matter if a draining or lost server did not end the
-  // stream properly.
+  // Everything is acknowledged, so it does not matter if the server did not end the stream properly
+  // because it was draining or lost.
   absl::Status status = connection_->ended() ? EndOf(connection_.get()) : absl::OkStatus();
   connection_ = nullptr;
   failed_ = absl::FailedPreconditionError("the append stream is finished");

@@ -19,10 +19,11 @@ namespace hulld {
 class AppendConnection;
 
 struct AppendOptions {
-  // Writer ID. Empty: a random one.
+  // Writer ID. If empty, a random ID is used.
   std::string writer_id;
   bool create_if_absent = false;
-  // Chunks in flight are kept for resending. Append waits while either bound is reached.
+  // Limits on the chunks in flight, which are kept in memory for resending. Append waits while
+  // either limit is reached.
   size_t max_in_flight_bytes = size_t{8} << 20;
   size_t max_in_flight_chunks = 64;
 };
@@ -37,17 +38,17 @@ struct AppendTotals {
   uint64_t reconnects = 0;
   // Sums over the acknowledgements received.
   v1::PointCounts counts;
-  // The last acknowledgement; without fields before the first one.
+  // The last acknowledgement. Empty if none has arrived.
   v1::AppendAck last_ack;
   uint64_t hull_revision = 0;
   uint64_t vertex_count = 0;
 };
 
-// A pipelined stream of chunks into one hull, with a bounded number in flight. If the connection
-// breaks, or the server ends the stream with a retry hint, the appender reconnects as the same
-// writer, reads the last committed sequence, and resends the missing chunks. Each chunk is applied
-// exactly once. The appender fails if the hull or the store was replaced, because acknowledged
-// points would be missing.
+// A pipelined stream of chunks into a hull, with a bounded number of chunks in flight. If the
+// connection breaks, or the server ends the stream with a retry hint, the appender reconnects as
+// the same writer, reads the last committed sequence, and resends the missing chunks. Each chunk is
+// applied exactly once. The appender fails if the hull or the store was replaced, because
+// acknowledged points would be missing.
 //
 // Not thread-safe. The destructor cancels chunks in flight.
 class Appender {
@@ -60,9 +61,8 @@ class Appender {
   const v1::AppendOpened& opened() const { return opened_; }
   const std::string& writer_id() const { return open_.writer_id(); }
 
-  // Queues one chunk with the writer's next sequence number. Waits while too much is in flight. An
-  // error, which may be about an earlier chunk, ends the stream and is returned by every later
-  // call.
+  // Queues a chunk with the writer's next sequence number. Waits while too much is in flight. An
+  // error, which may concern an earlier chunk, ends the stream and is returned by every later call.
   absl::Status Append(v1::PointBlock points);
 
   // Waits until every chunk is acknowledged, then ends the stream.
@@ -106,8 +106,8 @@ class Appender {
   size_t bytes_in_flight_ = 0;
   // Number of chunks of unacknowledged_ written to the current connection.
   size_t written_ = 0;
-  // Connections lost since the last acknowledgement, and the time to stop reconnecting: timeout_
-  // after the first loss.
+  // Number of connections lost since the last acknowledgement, and the time at which to stop
+  // reconnecting: timeout_ after the first loss.
   int failures_ = 0;
   Deadline give_up_at_;
   absl::Status failed_;

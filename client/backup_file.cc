@@ -140,8 +140,8 @@ absl::StatusOr<std::vector<fs::path>> MakeDirectories(const fs::path& directory)
       absl::StrCat("cannot create ", directory.string(), ": ", error.message()));
 }
 
-// Moves the unpacked files into place. The mark comes first and the database last, in one step: the
-// directory contains either no store, or the complete backup with the mark.
+// Moves the unpacked files into place, the mark first and the database last, in a single step. The
+// directory therefore contains either no store, or the complete backup with the mark.
 absl::Status MoveIntoPlace(const fs::path& staging, const fs::path& directory) {
   const fs::path mark = directory / kRestoredMark;
   std::ofstream(mark).close();

@@ -68,7 +68,7 @@ inline constexpr char kRestoredMark[] = "restored";
 
 // Creates a data directory from a backup: the complete store, or none. An existing directory must
 // be empty, except for lost+found and the remains of a killed call. Writes nothing outside the
-// directory. Returns the checked backup; the store that hulld opens there has another ID.
+// directory. Returns the checked backup. The store that hulld opens there has a new ID.
 // INVALID_ARGUMENT: the file is not a backup, or is damaged or truncated. FAILED_PRECONDITION: the
 // directory exists and is not empty. UNAVAILABLE: it cannot be written.
 absl::StatusOr<BackupCheck> RestoreBackup(const std::string& path, const std::string& directory);

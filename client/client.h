@@ -31,17 +31,17 @@ namespace hulld {
 inline constexpr char kDefaultServer[] = "127.0.0.1:50551";
 
 struct ClientOptions {
-  // HOST:PORT, or several servers over one store: see server_address.h.
+  // HOST:PORT, or several servers over one store; see server_address.h.
   std::string server = kDefaultServer;
-  // Deadline of each call, retries included. For an append stream, which may last longer, it bounds
-  // the wait for the next acknowledgement.
+  // Timeout of each call, including retries. An append stream may last longer; for it, the timeout
+  // bounds the wait for the next acknowledgement.
   std::chrono::milliseconds timeout{30000};
   RetryPolicy retry;
-  // Freshness of reads whose request does not set one (proto/hulld/v1/freshness.proto). Absent:
-  // linearizable. The pages of a list never go back in revision.
+  // Freshness of reads whose request does not set one (proto/hulld/v1/freshness.proto). Defaults to
+  // linearizable. Later pages of a list never have a lower revision than earlier ones.
   std::optional<v1::Freshness> freshness;
-  // True: opens a separate connection. By default, all clients of a process share one connection
-  // per server.
+  // Opens a separate connection. By default, all clients in a process share one connection per
+  // server.
   bool own_connection = false;
   // TLS and the token.
   ConnectionSecurity security;
@@ -50,9 +50,9 @@ struct ClientOptions {
 // The canonical mesh of a hull, assembled from its stream and checked for consistency.
 struct HullMesh {
   v1::MeshHeader header;
-  // Vertices, n x 3.
+  // The vertices, n x 3.
   std::vector<double> xyz;
-  // Vertices per facet, and the concatenated vertex indices of all facets.
+  // The number of vertices of each facet, and the concatenated vertex indices of all facets.
   std::vector<uint32_t> facet_sizes;
   std::vector<uint32_t> facet_indices;
 
@@ -65,12 +65,12 @@ struct HullMesh {
 // arrived. Calls that are safe to repeat are retried by options.retry until their deadline, after
 // UNAVAILABLE and after RESOURCE_EXHAUSTED with a retry hint. DeleteHull, DeleteBody, ReplaceHull,
 // SaveBackup, PutBody with if_revision, and CreateHull without if_absent are never retried.
-// ReasonOf and MetadataOf (grpc_status.h) return the reason of a refusal. ValidateSecurity checks
+// ReasonOf and MetadataOf (grpc_status.h) return the reason for a refusal. ValidateSecurity checks
 // options.security beforehand.
 class Client {
  public:
   explicit Client(ClientOptions options = {});
-  // Uses a given channel, such as an in-process one.
+  // Uses the given channel, for example an in-process channel.
   Client(ClientOptions options, std::shared_ptr<grpc::Channel> channel);
 
   absl::StatusOr<v1::CreateHullResponse> CreateHull(const std::string& hull_id,
@@ -80,27 +80,29 @@ class Client {
   absl::StatusOr<std::unique_ptr<Appender>> OpenAppend(const std::string& hull_id,
                                                        AppendOptions options = {}) const;
 
-  // Replaces a hull: `feed` passes blocks of points to its sink. An error of either ends the call
-  // and changes nothing. Not retried. The duration is proportional to the number of points, so
-  // options.timeout does not apply; `timeout`, if given, bounds the whole call.
+  // Replaces a hull by the hull of the points that `feed` passes to its sink, block by block. An
+  // error from either ends the call and changes nothing. Not retried. The duration is proportional
+  // to the number of points, so options.timeout does not apply; `timeout`, if given, bounds the
+  // whole call.
   using PointSink = std::function<absl::Status(const v1::PointBlock&)>;
   absl::StatusOr<v1::ReplaceHullResponse> ReplaceHull(
       const v1::ReplaceOpen& open, const std::function<absl::Status(const PointSink&)>& feed,
       std::optional<std::chrono::milliseconds> timeout = {}) const;
 
-  // Passes each part of a backup of the store to `receive`, in order. An error of `receive` ends
+  // Passes each part of a backup of the store to `receive`, in order. An error from `receive` ends
   // the call and is returned. Not retried; `timeout` as above.
   absl::Status SaveBackup(const std::function<absl::Status(const v1::SaveBackupResponse&)>& receive,
                           std::optional<std::chrono::milliseconds> timeout = {}) const;
 
   absl::StatusOr<v1::GetHullResponse> GetHull(const std::string& hull_id, bool audit = false) const;
-  // Accepts all options of the request, such as properties.
+  // Same as above, with all options of the request, such as properties.
   absl::StatusOr<v1::GetHullResponse> GetHull(const v1::GetHullRequest& request) const;
 
   // INTERNAL: the stream is inconsistent.
   absl::StatusOr<HullMesh> GetHullMesh(const std::string& hull_id) const;
-  // Accepts all options of the request, such as a simplification. Calls `on_part`, if set, after
-  // each part, with the mesh received so far; the header comes first. A retried call starts over.
+  // Same as above, with all options of the request, such as a simplification. Calls `on_part`, if
+  // set, after each part, with the mesh received so far. The header comes first. A retried call
+  // starts over.
   absl::StatusOr<HullMesh> GetHullMesh(
       const v1::GetHullMeshRequest& request,
       const std::function<void(const HullMesh&)>& on_part = {}) const;
@@ -108,8 +110,8 @@ class Client {
   // Returns one page.
   absl::StatusOr<v1::ListHullsResponse> ListHulls(const v1::ListHullsRequest& request) const;
 
-  // Reads all pages, or until `limit` hulls are read (0: no limit). The header is that of the last
-  // page; next_page_token is empty unless the limit ended the list.
+  // Reads all pages, up to a total of `limit` hulls (0 means no limit). The result has the header
+  // of the last page, and an empty next_page_token unless the limit ended the list.
   absl::StatusOr<v1::ListHullsResponse> ListAllHulls(const std::string& prefix,
                                                      uint64_t limit = 0) const;
 
@@ -117,13 +119,13 @@ class Client {
   absl::StatusOr<v1::DeleteHullResponse> DeleteHull(const std::string& hull_id,
                                                     std::optional<uint64_t> if_revision = {}) const;
 
-  // Creates a body, or replaces its pieces. Retried only without if_revision: the call is then
-  // idempotent.
+  // Creates a body, or replaces its pieces. Retried only without if_revision, because the call is
+  // then idempotent.
   absl::StatusOr<v1::PutBodyResponse> PutBody(const v1::PutBodyRequest& request) const;
   absl::StatusOr<v1::GetBodyResponse> GetBody(const std::string& body_id) const;
   // Returns one page.
   absl::StatusOr<v1::ListBodiesResponse> ListBodies(const v1::ListBodiesRequest& request) const;
-  // As ListAllHulls.
+  // Like ListAllHulls.
   absl::StatusOr<v1::ListBodiesResponse> ListAllBodies(const std::string& prefix,
                                                        uint64_t limit = 0) const;
   // Never retried, like DeleteHull.
@@ -137,22 +139,22 @@ class Client {
   absl::StatusOr<v1::CheckCollisionResponse> CheckCollision(
       const v1::CheckCollisionRequest& request) const;
 
-  // Passes each message of the answer to `receive`, in order. An error of `receive` ends the call
+  // Passes each message of the answer to `receive`, in order. An error from `receive` ends the call
   // and is returned. Retried only before the first message.
   using BatchReceiver = std::function<absl::Status(const v1::BatchCheckCollisionsResponse&)>;
   absl::Status BatchCheckCollisions(const v1::BatchCheckCollisionsRequest& request,
                                     const BatchReceiver& receive) const;
 
-  // Returns a stream of pose changes. The first message opens it, with the freshness of the
+  // Returns a stream for changes of poses. Its first message opens it, with the freshness of the
   // options. The timeout bounds the wait for each answer.
   std::unique_ptr<CollisionStream> OpenCollisionStream() const;
 
-  // As BatchCheckCollisions, for all pairs of a scene.
+  // Like BatchCheckCollisions, for all pairs of a scene.
   using SceneReceiver = std::function<absl::Status(const v1::FindCollisionsResponse&)>;
   absl::Status FindCollisions(const v1::FindCollisionsRequest& request,
                               const SceneReceiver& receive) const;
 
-  // Watches pairs for collisions that begin or end. The timeout bounds the time to reconnect to a
+  // Watches pairs for collisions that begin and end. The timeout bounds the time to reconnect to a
   // lost server.
   std::unique_ptr<CollisionWatch> WatchCollisions(v1::CollisionWatchOpen open) const;
 

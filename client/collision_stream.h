@@ -15,13 +15,13 @@
 
 namespace hulld {
 
-// One StreamCollisions call, step by step: the client sends poses, the server returns the relations
-// of the affected pairs. Never retried because the server's state ends with the stream. Not
-// thread-safe.
+// A StreamCollisions call, step by step: the client sends poses, and the server returns the
+// relations of the affected pairs. Never retried, because the server's state ends with the stream.
+// Not thread-safe.
 class CollisionStream final
     : public grpc::ClientBidiReactor<v1::StreamCollisionsRequest, v1::StreamCollisionsResponse> {
  public:
-  // timeout: for each answer. freshness: for an `open` without one.
+  // timeout: bounds the wait for each answer. freshness: used for an `open` without a freshness.
   CollisionStream(std::shared_ptr<v1::CollisionService::Stub> stub,
                   std::chrono::milliseconds timeout,
                   std::optional<v1::Freshness> freshness = std::nullopt);

@@ -13,17 +13,19 @@ namespace hulld {
 
 // Protection of a connection, and the client's credentials.
 struct ConnectionSecurity {
-  // Enables TLS. Without it nothing is encrypted, and the next four fields are ignored.
+  // Enables TLS. Without TLS, nothing is encrypted, and the next four fields are ignored.
   bool tls = false;
-  // PEM: trusted authorities for the server's certificate; empty: the system's.
+  // PEM of the authorities trusted to sign the server's certificate. If empty, the system's
+  // authorities.
   std::string authorities;
-  // PEM: the client's certificate and key, for a server that requires one; both or neither.
+  // PEM of the client's certificate and key, for a server that requires a client certificate. Set
+  // both or neither.
   std::string certificate;
   std::string key;
-  // Expected name in the server's certificate, if it differs from the address.
+  // Name expected in the server's certificate, if it differs from the address.
   std::string server_name;
 
-  // Sent with each call as "authorization: Bearer TOKEN"; empty: none.
+  // Token sent with each call as "authorization: Bearer TOKEN", if not empty.
   std::string token;
   // Allows sending the token unencrypted to another machine.
   bool allow_plaintext_token = false;

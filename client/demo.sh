@@ -1,5 +1,5 @@
 #!/bin/bash
-# Runs the textbook's collision scenes end to end, as a new user meets them:
+# Demonstrates textbook collision scenes end to end, as a new user would run them:
 #
 #   bash client/demo.sh
 #
@@ -79,7 +79,7 @@ start_server() {
   while (exec 3<>"/dev/tcp/127.0.0.1/$port") 2>/dev/null; do port=$((port + 1)); done
   address=127.0.0.1:$port
   heading "Starting hulld on $address"
-  # Starts empty: the hulls of the last run would still be in the store.
+  # Starts with an empty store, without the hulls of the last run.
   rm -rf "$work/data"
   "$build/bin/hulld" --listen "$address" --data-dir "$work/data" >"$work/hulld.log" 2>&1 &
   server_pid=$!
@@ -173,8 +173,8 @@ generated_scenes() {
   ask OVERLAPPING "centers 1 apart?" ball3000 ball100 --pose-b 1,0,0
 }
 
-# A writer streams larger and larger balls into one hull while a reader asks whether it collides
-# with a second hull. Answers state the revision that they were computed from.
+# A writer streams larger and larger balls into a hull while a reader checks it for a collision with
+# a second hull. Each answer states the revision from which it was computed.
 streaming_scene() {
   local radius revision last moves=0 points=$work/live.fifo
   heading "A live hull grows while it is queried: does it reach the ball at distance 6?"

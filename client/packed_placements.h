@@ -10,8 +10,8 @@
 
 namespace hulld {
 
-// Returns the numbers of a pose: quaternion w x y z, then translation x y z. Missing parts are
-// those of the identity.
+// Returns the numbers of a pose: quaternion w x y z, then translation x y z. Missing parts default
+// to those of the identity.
 std::array<double, 7> NumbersOf(const v1::Pose& pose);
 
 // Returns the pose with these numbers.

@@ -135,7 +135,7 @@ constexpr Reading kGauges[] = {
      Get<&Measured::disk, &StoreDisk::log_bytes>},
     {"hulld_store_free_bytes", "Free bytes on the store's disk.",
      [](const Measured& now) {
-       // NaN compares less than no number, so no alert fires.
+       // NaN is never less than a number, so no alert fires.
        return now.disk.free_bytes.has_value() ? static_cast<double>(*now.disk.free_bytes)
                                               : std::numeric_limits<double>::quiet_NaN();
      }},

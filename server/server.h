@@ -56,7 +56,7 @@ class Server {
   // Registry::RestIdleHulls.
   void RestIdleHulls() { registry_.RestIdleHulls(); }
 
-  // Store::OnEnded: this server must end without draining.
+  // Registers a callback as Store::OnEnded does: this server must then end without draining.
   void OnStoreEnded(std::function<void()> ended) { store_->OnEnded(std::move(ended)); }
 
   // Sets health to NOT_SERVING and refuses new calls with UNAVAILABLE; running calls continue.

@@ -16,12 +16,12 @@ namespace hulld {
 // Returns the same code and message, with the server's reason.
 absl::Status FromGrpcStatus(const grpc::Status& status);
 
-// Same as above, with the request ID and the retry hint. context: of the finished call.
+// Same as above, with the request ID and the retry hint. context: the context of the finished call.
 absl::Status FromGrpcStatus(const grpc::Status& status, const grpc::ClientContext& context);
 
-// Returns hulld's reason for the error. ERROR_REASON_UNSPECIFIED: hulld sent none, this version of
-// the contract does not know it, or the error comes from gRPC itself, for example if no server can
-// be reached.
+// Returns hulld's reason for the error. Returns ERROR_REASON_UNSPECIFIED if hulld sent no reason,
+// if this version of the contract does not know it, or if the error comes from gRPC itself, for
+// example because no server can be reached.
 v1::ErrorReason ReasonOf(const absl::Status& status);
 
 // Returns a value that error.proto lists for the reason, such as "expected_sequence"; nullopt if

@@ -21,7 +21,7 @@ struct RetryPolicy {
   int max_attempts = std::numeric_limits<int>::max();
   std::chrono::milliseconds initial_backoff{100};
   std::chrono::milliseconds max_backoff{2000};
-  // Replacements for the wait and the clock, for tests. Empty: sleep and the monotonic clock.
+  // Replacements for the wait and the clock, for tests. Default to a sleep and the monotonic clock.
   std::function<void(std::chrono::milliseconds)> wait;
   std::function<Deadline()> now;
 

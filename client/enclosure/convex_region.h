@@ -35,9 +35,9 @@ class HalfSpace {
   double unit_offset_;
 };
 
-// A convex hull as an intersection of half spaces. With volume: the half spaces of its facets.
-// Flat: a plane and the sides of its polygon, a line and its ends, or a point. The hull of no
-// points contains no point.
+// A convex hull as an intersection of half spaces. A solid hull has the half spaces of its facets.
+// A flat hull is a plane and the sides of its polygon, a line and its ends, or a point. The hull of
+// no points contains no point.
 class ConvexRegion {
  public:
   // Returns the region of a hull from the server. Requires that all numbers of the mesh were

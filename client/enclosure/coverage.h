@@ -20,7 +20,7 @@ struct UncoveredTriangle {
   // Its index in the mesh.
   size_t triangle = 0;
   // The point of the uncovered part, among the corners left by clipping, that is farthest from all
-  // pieces, and its distance. Floating point: errors of a few units of roundoff.
+  // pieces, and its distance. In floating point, with errors of a few units of roundoff.
   std::array<double, 3> point = {0, 0, 0};
   double distance = 0;
   // Area of the uncovered part, in floating point; 0 for a triangle without area.
@@ -43,7 +43,7 @@ struct CoveringPiece {
   RigidPose X_WH = kNoMotion;
 };
 
-// Checks in exact arithmetic whether convex pieces cover a mesh, with its triangles as closed
+// Checks in exact arithmetic that convex pieces cover a mesh, with its triangles as closed
 // sets.
 //
 // A triangle with all corners in one piece lies in it. Any other is clipped by the half spaces of

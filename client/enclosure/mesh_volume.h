@@ -13,10 +13,10 @@ namespace hulld {
 // them. Cost: n log n.
 bool IsClosed(const TriangleMesh& mesh);
 
-// Returns the volume of the hull divided by that of the mesh: each summed exactly (signed
-// tetrahedra, Gauss 1813), the quotient rounded. Overlapping parts of the mesh count twice; its
-// orientation does not matter. Nullopt if the mesh is not closed or has no volume. Requires planar
-// facets of the hull, as returned by the server. Cost: exact arithmetic for each triangle.
+// Returns the volume of the hull divided by the volume of the mesh. Each is summed exactly (signed
+// tetrahedra, Gauss 1813), and the quotient is rounded. Overlapping parts of the mesh count twice;
+// its orientation does not matter. Nullopt if the mesh is not closed or has no volume. Requires
+// planar facets of the hull, as returned by the server. Cost: exact arithmetic for each triangle.
 std::optional<double> VolumeRatio(const HullMesh& hull, const TriangleMesh& mesh);
 
 }  // namespace hulld

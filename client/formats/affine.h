@@ -6,8 +6,8 @@
 
 namespace hulld {
 
-// Transform of a node. Row-major 3 x 4: three columns of rotation, scale, and shear, then the
-// translation.
+// The transform of a node, as a row-major 3 x 4 matrix: three columns of rotation, scale, and
+// shear, then the translation.
 struct Affine {
   std::array<std::array<double, 4>, 3> m = {{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}};
 };

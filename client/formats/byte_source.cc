@@ -132,7 +132,7 @@ bool ByteSource::ReadLine(std::string_view* line) {
   *line = std::string_view(buffer_.data() + begin_, length);
   begin_ = std::min(begin_ + length + 1, end_);
   while (!line->empty() && line->back() == '\r') line->remove_suffix(1);
-  // The end mark of text under DOS.
+  // The end-of-text mark of DOS.
   if (at_end_ && begin_ == end_ && !line->empty() && line->back() == '\x1A') line->remove_suffix(1);
   for (const auto& [byte, name] : {std::pair('\0', "NUL"), std::pair('\x1A', "^Z")}) {
     if (line->find(byte) == std::string_view::npos) continue;

@@ -16,7 +16,7 @@
 
 namespace hulld {
 
-// Reads a file or pipe from front to back, as lines or bytes, through one buffer. Memory does not
+// Reads a file or pipe sequentially, as lines or bytes, through a single buffer. Memory does not
 // grow with the file. Tracks its position for errors.
 //
 // Lines end at LF or CR LF, or at CR if the first line does. A UTF-8 byte order mark is skipped, as
@@ -73,7 +73,7 @@ class ByteSource {
   // INVALID_ARGUMENT "NAME:LINE: message" and "NAME: byte OFFSET: message".
   absl::Status ErrorAtLine(const std::string& message) const;
   absl::Status ErrorAtByte(const std::string& message) const;
-  // Returns the error that stopped reading; otherwise an error that the file is truncated.
+  // Returns the error that stopped reading, or else the error that the file is truncated.
   absl::Status Truncated(const std::string& what) const;
 
  private:

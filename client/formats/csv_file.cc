@@ -116,7 +116,7 @@ absl::Status AddRow(const ByteSource& source, const std::vector<std::string_view
                     const CsvLayout& layout, PointCollector* points) {
   const auto& columns = layout.columns;
   const size_t named = layout.named;
-  // R's write.table names the columns of the data, but not that of the row names.
+  // R's write.table names the columns of the data, but not the column of row names.
   if (named > 0 && cells.size() > named && !cells[named].empty()) {
     return source.ErrorAtLine(absl::StrCat("the row has ", Counted(cells.size(), "column"),
                                            ", but the header names ", named, "; name each column"));

@@ -30,9 +30,9 @@ bool IsCsvComment(std::string_view line);
 // Returns the layout that a header defines: a row of names, among them x, y, and z in any case, or
 // Points:0 to Points:2 as ParaView writes them. If no column has such a name, x, y, and z may have
 // a unit, as in X [m], or a path, as in field.x. Also a header of pandas with an index: an empty
-// name, then 0, 1, 2, and so on. Nullopt: the row has numbers and is not a header. `separator`: by
-// default, a semicolon, tab, comma, or white space, whichever the row contains. INVALID_ARGUMENT,
-// naming the source's current line: a coordinate is named never or twice.
+// name, then 0, 1, 2, and so on. Nullopt if the row has numbers and is not a header. `separator`:
+// by default, a semicolon, tab, comma, or white space, whichever the row contains.
+// INVALID_ARGUMENT, naming the source's current line: a coordinate is missing or named twice.
 absl::StatusOr<std::optional<CsvLayout>> CsvHeader(const ByteSource& source, std::string_view line,
                                                    std::optional<char> separator = std::nullopt);
 
@@ -42,8 +42,8 @@ absl::StatusOr<std::optional<CsvLayout>> CsvHeader(const ByteSource& source, std
 absl::Status CheckFirstRow(ByteSource* source, std::string_view row,
                            std::optional<char> separator = std::nullopt);
 
-// Returns the layout of a header that is a comment, as CloudCompare and numpy write it. Nullopt:
-// another comment.
+// Returns the layout of a header in a comment, as CloudCompare and numpy write it. Nullopt for any
+// other comment.
 std::optional<CsvLayout> CsvHeaderInComment(const ByteSource& source, std::string_view line,
                                             std::optional<char> separator = std::nullopt);
 

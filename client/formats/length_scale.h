@@ -21,7 +21,7 @@ class LengthScale {
   // same nearest double.
   static std::optional<LengthScale> FromText(std::string_view decimal);
 
-  // Returns the product of both factors as FromText parses it.
+  // Returns the product of both factors, replaced as in FromText if it has too many digits.
   std::optional<LengthScale> Times(const LengthScale& other) const;
 
   bool is_one() const { return mantissa_ == 1 && exponent_ == 0 && !negative_; }

@@ -157,7 +157,7 @@ bool IsControl(char c) {
   return byte < 0x20 && !absl::ascii_isspace(byte);
 }
 
-// True if control characters are errors, because the header of a binary file would not look so.
+// True if control characters are errors, because the header of a binary file would look different.
 bool IsDamagedText(std::string_view start) {
   const std::string text = absl::AsciiStrToLower(std::string(start));
   return absl::StartsWith(text, "solid") && absl::StrContains(text, "facet normal");
@@ -168,7 +168,7 @@ bool IsDamagedText(std::string_view start) {
 absl::Status WalkStl(ByteSource* source, const StlReceiver& receiver) {
   std::string_view start = source->Peek(kBytesToClassify);
   if (!source->status().ok()) return source->status();
-  // The end mark of text under DOS.
+  // The end-of-text mark of DOS.
   if (start.size() < kBytesToClassify && !start.empty() && start.back() == '\x1A')
     start.remove_suffix(1);
   if (std::any_of(start.begin(), start.end(), IsControl) && !IsDamagedText(start)) {

@@ -19,8 +19,8 @@ std::vector<std::string_view> CellsOf(std::string_view line);
 
 // Reads waypoints one by one from a table: a header of variable names (see JointVariable), then one
 // row per waypoint, in radians and meters, separated by commas, semicolons, tabs, or spaces. Skips
-// a column "time", blank lines, and lines that start with #. Variables without a column stay at
-// rest. Memory does not grow with the file.
+// a column named "time", blank lines, and lines that start with #. Variables without a column stay
+// at rest. Memory does not grow with the file.
 class WaypointReader {
  public:
   // Reads the header. INVALID_ARGUMENT names the line: an unknown joint, a joint that is fixed or

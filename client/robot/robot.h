@@ -67,7 +67,7 @@ struct RobotJoint {
 
   // Returns true if the joint has a value of its own.
   bool is_free() const { return kind != JointKind::kFixed && mimics < 0; }
-  // Returns true if the motion of the child is unbounded.
+  // Returns true if the child can move without bounds.
   bool is_loose() const { return kind == JointKind::kPlanar || kind == JointKind::kFloating; }
 };
 

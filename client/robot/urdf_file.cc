@@ -95,7 +95,7 @@ class UrdfReader {
     RobotJoint joint;
     std::string parent;
     std::string child;
-    // The joint that it mimics; empty for none.
+    // The joint that it mimics, or empty.
     std::string leader;
   };
 

@@ -20,11 +20,11 @@ namespace hulld {
 enum class Verdict {
   // The certificate proves the relation.
   kValid,
-  // It does not prove the relation.
+  // The certificate does not prove the relation.
   kInvalid,
-  // There is nothing to check, or the hulls of the answer no longer exist.
+  // The answer has nothing to check, or its hulls no longer exist.
   kCannotCheck,
-  // Same as above, because a hull has since changed; a new query may succeed.
+  // The answer cannot be checked because a hull has changed since; a new query may succeed.
   kMoved,
 };
 
@@ -76,7 +76,8 @@ class AnswerChecker {
   // `client` must outlive this object.
   explicit AnswerChecker(const Client& client) : client_(client) {}
 
-  // Fetches missing hulls and returns errors of these calls. A deleted hull results in kMoved.
+  // Fetches missing hulls, and returns the errors of these calls. If a hull was deleted, the
+  // verdict is kMoved.
   absl::StatusOr<Verification> Check(const CheckedAnswer& answer);
   absl::StatusOr<Verification> Check(const CheckedBodies& answer);
   // Same as above, for a single call, which may concern bodies.
@@ -84,7 +85,7 @@ class AnswerChecker {
                                      const v1::CheckCollisionResponse& response);
 
  private:
-  // Returns null, with the reason, if the server no longer has the mesh at that version.
+  // Returns null, and sets the reason, if the server no longer has the mesh at that version.
   absl::StatusOr<const HullMesh*> Fetch(const v1::HullVersion& version, Verification* problem);
   // Returns the vertices of a placed hull, or the points of its inline shape; nullopt as above. The
   // result refers to data of the placement and of this object.

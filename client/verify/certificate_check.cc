@@ -99,7 +99,7 @@ absl::Status CheckTouching(const v1::Certificate& certificate, const ExactHull& 
   BigVector n;
   HULLD_RETURN_IF_ERROR(ReadDirection(certificate, &n));
   if (GapSign(a, b, n) < 0) {
-    return ProofFails("the direction does not keep the insides apart: max n.A > min n.B");
+    return ProofFails("the direction does not separate the interiors: max n.A > min n.B");
   }
   if (HoldsOriginOnBoundary(differences)) return absl::OkStatus();
   return ProofFails(

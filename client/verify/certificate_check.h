@@ -13,10 +13,11 @@
 
 namespace hulld {
 
-// Returns OK if the certificate proves that A and B are in this relation, and FAILED_PRECONDITION
-// with the missing proof otherwise. Exact over the given doubles, from the definitions in
-// collision.proto and geometry.proto alone; shares no code with the server. Parts that the relation
-// does not need are ignored. Vertices that come with coordinates must match their index.
+// Returns OK if the certificate proves that A and B are in this relation, and otherwise
+// FAILED_PRECONDITION with the missing proof. The check is exact for the given doubles. It follows
+// from the definitions in collision.proto and geometry.proto alone, and shares no code with the
+// server. Parts of the certificate that the relation does not need are ignored. If vertices come
+// with coordinates, these must match their indices.
 //
 // An empty hull is separated from everything, and needs no certificate for that.
 //

@@ -22,10 +22,10 @@ double MaxTimeError(const v1::Wanted& wanted);
 
 // Returns OK if the intervals prove that A and B are separated up to contact.separated_until, and
 // the certificate proves their contact at contact.contact_time; for SEPARATED, if the intervals
-// cover the motion. Otherwise FAILED_PRECONDITION with the missing proof. OUT_OF_RANGE: all is
-// proven, but the two times are more than max_time_error apart, which the contract allows if the
-// pair is nearly in contact in between. Exact, from the definitions in the proto files alone, like
-// CheckCertificate.
+// cover the motion. Otherwise FAILED_PRECONDITION with the missing proof. OUT_OF_RANGE: everything
+// is proven, but the two times are more than max_time_error apart, which the contract allows if the
+// pair is nearly in contact in between. Like CheckCertificate, the check is exact and follows from
+// the definitions in the proto files alone.
 //
 // For a translation without radii, the certificate proves contact at contact_time, or between
 // separated_until and contact_time; that a TOUCHING pair never overlaps, or that an OVERLAPPING
@@ -37,7 +37,7 @@ absl::Status CheckFirstContact(v1::Relation relation, const v1::FirstContact& co
                                const v1::Certificate& at_contact, const MovingVertices& a,
                                const MovingVertices& b, double max_time_error);
 
-// Checks the first contact of two bodies likewise. a, b: all pieces of each body, in order. Every
+// Does the same for the first contact of two bodies. a, b: all pieces of each body, in order. Every
 // pair of nonempty pieces must have intervals up to contact.separated_until. If the bodies meet,
 // one pair must be in contact and have the relation of the bodies; for translations without radii,
 // it may be TOUCHING if the bodies are OVERLAPPING, because they may overlap later.

@@ -15,7 +15,8 @@ using PieceCertificates = google::protobuf::RepeatedPtrField<v1::PieceCertificat
 
 // Returns OK if these certificates prove that A and B, each given by all of its pieces in order,
 // are in this relation; otherwise FAILED_PRECONDITION, which names the pieces and the missing
-// proof. Exact, from the definitions in the proto files alone, like CheckCertificate.
+// proof. Like CheckCertificate, the check is exact and follows from the definitions in the proto
+// files alone.
 //
 // Each certificate must prove its own relation for its own pair. None of these relations may be
 // stronger than that of the bodies, and one must equal it, unless the bodies are SEPARATED. Every

@@ -13,15 +13,15 @@
 namespace hulld {
 
 // Returns OK if a simplification satisfies the request and the claims of its header, and
-// FAILED_PRECONDITION with the first claim that does not hold. Exact over the given doubles, from
-// the definitions in hull.proto alone; shares no code with the server.
+// FAILED_PRECONDITION with the first claim that does not hold. The check is exact for the given
+// doubles. It follows from the definitions in hull.proto alone, and shares no code with the server.
 //
 // Inside: each vertex is a vertex of the hull, and each vertex of the hull is within the error of
 // the simplification. Outside: the simplification contains each vertex of the hull, and each of its
 // vertices is within the error of the hull. This bounds the Hausdorff distance, because the
 // distance from a convex set is largest at a vertex. The number of vertices is at most
-// max_vertices; with max_error alone, the error is at most that. With both, the check does not look
-// for another hull that satisfies both.
+// max_vertices, and with max_error alone, the error is at most max_error. With both limits, the
+// check does not look for another hull that meets both.
 //
 // A point is within the error if it is within the error of a triangle of vertices, and inside if a
 // tetrahedron of vertices contains it. Facets only guide the search: wrong facets can make the

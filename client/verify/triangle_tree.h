@@ -36,11 +36,11 @@ class UnitBox {
   double size_ = 1;
 };
 
-// Finds candidate triangles for a query about a point. Floating point with slack: it may report
-// false candidates, but misses none.
+// Finds candidate triangles for a query about a point. Works in floating point with slack, so it
+// may report false candidates but misses none.
 //
-// Idea: a tree of boxes over the triangles. Cost: n log n to build; about log n per query, and one
-// call per candidate.
+// A tree of boxes over the triangles. Cost: n log n to build; about log n per query, and one call
+// per candidate.
 class TriangleTree {
  public:
   // Returns true if the triangle of this index settles the query.

@@ -94,7 +94,8 @@ absl::StatusOr<v1::WatchCollisionsResponse> CollisionWatch::Next() {
     }
     const absl::Status status = Close(*call_);
     call_.reset();
-    // Counts from the first failure because the watch may have been quiet for hours before it.
+    // The deadline starts at the first failure, because the watch may have been quiet for hours
+    // before.
     if (failures == 0) deadline = retry.Now() + patience_;
     if (!MayRetry(status) || !WaitBeforeRetry(retry, ++failures, deadline, status)) return status;
   }

@@ -17,14 +17,14 @@
 namespace hulld {
 
 // WatchCollisions, message by message: reports collisions of pairs as they begin and end. After a
-// lost connection, the watch resumes: it opens another call with the current poses, reports the
+// lost connection, the watch resumes: it opens a new call with the current poses, reports the
 // changes since the loss without repeating events, and marks their end with another `synced`. Code
-// that accumulates the events need not handle connections. Next and Update may each be called by
-// one thread, the same or different ones; Cancel by any thread.
+// that accumulates the events need not handle lost connections. Next and Update may each be called
+// by one thread, not necessarily the same one, and Cancel by any thread.
 class CollisionWatch {
  public:
-  // Connects in Next. patience: time to reconnect to a lost server. The first call and refused
-  // calls fail as `retry` specifies.
+  // Next connects. patience: the time to reconnect to a lost server. The first call and refused
+  // calls are retried as `retry` specifies.
   CollisionWatch(std::shared_ptr<v1::CollisionService::Stub> stub, v1::CollisionWatchOpen open,
                  RetryPolicy retry, std::chrono::milliseconds patience);
   // Cancels the watch.

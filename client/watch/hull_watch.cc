@@ -38,7 +38,8 @@ absl::StatusOr<v1::WatchHullsResponse> HullWatch::Next() {
       return message;
     }
     const absl::Status status = Close();
-    // Counts from the first failure because the watch may have been quiet for hours before it.
+    // The deadline starts at the first failure, because the watch may have been quiet for hours
+    // before.
     if (failures == 0) deadline = retry.Now() + patience_;
     if (!MayRetry(status) || !WaitBeforeRetry(retry, ++failures, deadline, status)) return status;
   }

@@ -13,14 +13,14 @@
 
 namespace hulld {
 
-// WatchHulls, message by message. After a lost connection, the watch resumes: it opens another call
+// WatchHulls, message by message. After a lost connection, the watch resumes: it opens a new call
 // after the last header's revision, and marks the end of the missed events with another `synced`.
-// Code that accumulates the events need not handle connections. Next may be called by one thread,
-// Cancel by any thread.
+// Code that accumulates the events need not handle lost connections. Next may be called by one
+// thread, and Cancel by any thread.
 class HullWatch {
  public:
-  // Connects in Next. patience: time to reconnect to a lost server. The first call and refused
-  // calls fail as `retry` specifies.
+  // Next connects. patience: the time to reconnect to a lost server. The first call and refused
+  // calls are retried as `retry` specifies.
   HullWatch(std::shared_ptr<v1::HullService::Stub> stub, v1::WatchHullsRequest request,
             RetryPolicy retry, std::chrono::milliseconds patience);
   // Cancels the watch.

@@ -12,10 +12,10 @@
 
 namespace hulld {
 
-// Pair states reported by a WatchCollisions call. When another call replaces it and starts with the
-// full state, this class removes events already reported and adds the end events of pairs that no
-// longer collide, so that both calls together report the same events as a single one. Memory: the
-// pairs that collide or are near.
+// The pair states reported by a WatchCollisions call. When a new call replaces it and starts with
+// the full state, this class removes events that were already reported, and adds end events for
+// pairs that no longer collide, so that both calls together report the same events as a single
+// call. Memory: the pairs that collide or are near.
 class ReportedPairs {
  public:
   // `open` is the watch's first message: it names the hulls of placements and any clearance.
@@ -23,7 +23,7 @@ class ReportedPairs {
 
   // Marks the next message as the first of another call.
   void Restart();
-  // Records a message, after rewriting it to the message that a single call would have sent.
+  // Rewrites a message to the message that a single call would have sent, and records it.
   void Take(v1::WatchCollisionsResponse* message);
 
  private:

@@ -11,7 +11,7 @@
 namespace hulld {
 namespace {
 
-// Neither allocates nor locks because the heap or a lock may be corrupt.
+// Neither allocates nor locks, because the heap or a lock may be corrupt.
 void WriteError(std::string_view text) {
   while (!text.empty()) {
     const ssize_t written = write(STDERR_FILENO, text.data(), text.size());

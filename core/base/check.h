@@ -15,8 +15,8 @@ namespace hulld {
 #define HULLD_CHECK(condition) \
   ((condition) ? (void)0 : ::hulld::CheckFailed(__FILE__, __LINE__, #condition))
 
-// HULLD_CHECK only in builds without NDEBUG (the presets dev, asan-ubsan, tsan and fuzz), so the
-// condition may be expensive. In other builds the condition is compiled but never evaluated.
+// HULLD_CHECK for expensive conditions, enabled only in builds without NDEBUG (the presets dev,
+// asan-ubsan, tsan, and fuzz). In other builds, the condition is compiled but never evaluated.
 #ifdef NDEBUG
 #define HULLD_DCHECK(condition) (true ? (void)0 : (void)(condition))
 #else

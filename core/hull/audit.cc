@@ -132,8 +132,8 @@ struct SharedEdge {
   Side right;
 };
 
-// Returns every side by tail and head, with the opposite side of the neighboring facet: the one at
-// the same position in the order by head and tail.
+// Returns every side, sorted by tail and head, with the opposite side of the neighboring facet,
+// which is at the same position in the order by head and tail.
 absl::StatusOr<std::vector<SharedEdge>> CheckManifold(const Hull& hull, StopPoll& poll) {
   const size_t count = hull.vertices().size();
   std::vector<Side> sides;
@@ -274,7 +274,7 @@ absl::Status AuditPolygon(const std::vector<IntegerVector>& v, const Hull& hull,
   }
   const std::span<const uint32_t> facet = hull.facet(0);
   if (absl::Status s = CheckFacet(v, facet, 0, poll); !s.ok()) return s;
-  if (facet[1] > facet.back()) return Finding("the polygon is not the canonical way round");
+  if (facet[1] > facet.back()) return Finding("the polygon is not in its canonical orientation");
   // Position in the loop, by vertex. If a vertex occurs twice, another vertex has no position.
   std::vector<size_t> places(v.size(), SIZE_MAX);
   for (size_t i = 0; i < facet.size(); ++i) {

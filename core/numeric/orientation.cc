@@ -40,7 +40,7 @@ std::optional<int> FilteredOrient3d(const Vector& r, const Vector& s, const Vect
                            (std::abs(t_yr_z) + std::abs(t_zr_y)) * std::abs(s.x()) +
                            (std::abs(r_ys_z) + std::abs(r_zs_y)) * std::abs(t.x());
   if (!(permanent < kPermanentMax)) return std::nullopt;
-  // Uses a sum of absolute values in place of the largest: it is cheaper than nine comparisons.
+  // The sum of the absolute values bounds the largest, and is cheaper than nine comparisons.
   const double size = std::abs(r.x()) + std::abs(r.y()) + std::abs(r.z()) + std::abs(s.x()) +
                       std::abs(s.y()) + std::abs(s.z()) + std::abs(t.x()) + std::abs(t.y()) +
                       std::abs(t.z());
@@ -122,7 +122,7 @@ std::array<double, 2> FixedPointScale(double largest) {
 }
 
 // Returns the points if all coordinates are integers on the scale of the largest, as is usual for a
-// lattice, a drawing or a scan; otherwise empty.
+// lattice, a CAD model, or a scan. Otherwise empty.
 std::optional<FixedPoints> ToFixedPoints(const FourPoints& points, double largest) {
   const std::array<double, 2> scale = FixedPointScale(largest);
   FixedPoints fixed;
@@ -241,8 +241,8 @@ int ExactOrient2d(const Vector& a, const Vector& b, const Vector& c, CoordinateP
 }  // namespace
 
 int Orient3d(const Vector& a, const Vector& b, const Vector& c, const Vector& d) {
-  // Points in a plane across an axis, as on many facets of drawings. Usually one comparison for
-  // each.
+  // Points in a plane perpendicular to an axis, as on many facets of CAD models. Usually costs one
+  // comparison per axis.
   for (int k = 0; k < 3; ++k) {
     if (a[k] == b[k] && a[k] == c[k] && a[k] == d[k]) {
       ++counts.filter;

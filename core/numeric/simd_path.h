@@ -16,7 +16,7 @@ namespace hulld {
 enum class SimdPath {
   kPortable,  // the baseline that all code is compiled for
   kAvx2,
-  kNeon,  // part of every 64-bit ARM; loops that the compiler would not put into its registers
+  kNeon,  // on every 64-bit ARM; only for loops that the compiler does not vectorize
 };
 
 namespace internal {

@@ -19,8 +19,8 @@ constexpr int kPairsPerPiece = 16;
 std::vector<absl::StatusOr<Answer>> CheckCollisions(std::span<const PlacedHull> placements,
                                                     std::span<const PlacedPair> pairs,
                                                     const QueryOptions& options, int threads) {
-  // A status without a message is a plain number. A message would be shared by all answers and
-  // reference-counted.
+  // A status without a message is a plain number. A message would be reference-counted and shared
+  // by all answers.
   std::vector<absl::StatusOr<Answer>> answers(pairs.size(), absl::CancelledError());
   QueryOptions each = options;
   each.threads = 1;

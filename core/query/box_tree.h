@@ -29,8 +29,8 @@ struct Box {
   }
 };
 
-// Returns a box (world frame) that certainly contains the rounded hull. Covers all of space beyond
-// the range of doubles. Empty for an empty hull.
+// Returns a box (world frame) that certainly contains the rounded hull. Covers all of space if
+// coordinates are beyond the range of doubles. Empty for an empty hull.
 Box BoundingBox(const PlacedHull& placed);
 
 // Returns a box, rounded outwards, that contains all points within `clearance` >= 0 of `box`.
@@ -76,7 +76,7 @@ class BoxTree {
   // Boxes of a leaf, at most kLeafBoxes, and their indices.
   std::span<const Box> boxes(uint32_t leaf) const { return Part(boxes_, leaf); }
   std::span<const uint32_t> indices(uint32_t leaf) const { return Part(indices_, leaf); }
-  // A choice, not tuned.
+  // Not tuned.
   static constexpr uint32_t kLeafBoxes = 8;
 
   size_t MemoryBytes() const {
@@ -104,7 +104,7 @@ class BoxTree {
   static constexpr uint32_t kMaxUnshared = 2048;
 
   static uint32_t NodesOf(uint32_t boxes);
-  // Builds the node `index` and those below it. `begin`: the position of the first item.
+  // Builds the node `index` and the nodes below it. `begin`: the position of the first item.
   void Build(std::span<const Box> boxes, std::span<Item> items, uint32_t begin, uint32_t index,
              const std::function<bool()>& should_stop);
 

@@ -57,9 +57,10 @@ class Surrounding {
   Surrounding(ExactPair& pair, const std::function<bool()>& should_stop)
       : pair_(pair), poll_(should_stop, 1) {}
 
-  // Repeats: take a half-space that contains all vertices found and has the origin on its boundary,
-  // and add the farthest vertex outside it. When no such half-space remains, drops every vertex
-  // that is not needed. At most six remain (Steinitz 1913). Requires: the origin strictly inside A
+  // Repeatedly takes a half-space that contains all vertices found and has the origin on its
+  // boundary, and adds the farthest vertex outside it. When no half-space of this kind remains,
+  // drops every vertex that is not needed. At most six remain (Steinitz 1913). Requires: the origin
+  // strictly inside A
   // - B.
   absl::StatusOr<std::vector<VertexPair>> Find() {
     while (const std::optional<IntegerVector> n = Escape(corners_)) {

@@ -22,10 +22,10 @@ namespace hulld {
 absl::StatusOr<Certificate> MakeCertificate(ExactPair& exact, const Decision& decision,
                                             const std::function<bool()>& should_stop);
 
-// Returns the certificate of a relation of rounded hulls, not both of radius 0: the direction in
-// which the cores are nearest, and the pairs of vertices that surround the nearest point of A - B.
-// `hint`: a direction that may prove SEPARATED; zero if unknown. `seed`: pairs of vertices near
-// that point; at most four, may be empty. Otherwise as MakeCertificate.
+// Returns the certificate of a relation of rounded hulls, at least one of which has a radius: the
+// direction in which the cores are nearest, and the pairs of vertices that surround the nearest
+// point of A - B. `hint`: a direction that may prove SEPARATED; zero if unknown. `seed`: pairs of
+// vertices near that point; at most four, may be empty. Otherwise as MakeCertificate.
 absl::StatusOr<Certificate> MakeRoundedCertificate(ExactPair& exact, Relation relation,
                                                    const Vector& hint,
                                                    std::span<const VertexPair> seed,

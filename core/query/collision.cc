@@ -121,7 +121,7 @@ SeparationRequest RequestOf(const QueryOptions& options) {
           options.max_error,       options.clearance,    options.max_depth_bytes};
 }
 
-// Adds the requested details of the separation. `decision`: of the cores.
+// Adds the requested details of the separation. `decision`: the decision for the cores.
 absl::Status AddSeparation(const FloatPair& pair, const Decision& decision, bool cold,
                            const QueryOptions& options, Answer& answer) {
   if (!WantsSeparation(options)) return absl::OkStatus();
@@ -220,7 +220,8 @@ absl::Status AddRoundedEvidence(const FloatPair& pair, uint64_t directions_tried
   return absl::OkStatus();
 }
 
-// CertifiedSearch of rounded hulls, not both of radius 0. Requires: as CertifiedSearch.
+// CertifiedSearch for rounded hulls, at least one of which has a radius. Requires: as
+// CertifiedSearch.
 absl::StatusOr<Answer> SearchRounded(const PlacedHull& a, const PlacedHull& b,
                                      const QueryOptions& options, PairCache* cache) {
   const FloatPair pair(a, b);

@@ -33,7 +33,7 @@ struct Decision {
   uint64_t directions_tried = 0;
 };
 
-// The purpose of a decision.
+// The use of a decision.
 enum class Purpose {
   kRelation,
   kEvidence,  // also the axis and the pairs that the search found
@@ -43,7 +43,7 @@ enum class Purpose {
 // proves it: bounding spheres; the cache; for the relation alone, bounds of the hulls along the
 // line of their centers; the hulls in floating point; exact arithmetic. Fills `decision`, which
 // must be newly constructed. Requires: tolerance >= 0. Updates the cache, which may be null and
-// otherwise belongs to these two hulls. `max_error`: that of SearchInFloatingPoint. CANCELLED:
+// otherwise must belong to these two hulls. `max_error`: as for SearchInFloatingPoint. CANCELLED:
 // should_stop, which may be empty, returned true; only the exact rung polls it.
 absl::Status Decide(const FloatPair& pair, double tolerance, PairCache* cache, Purpose purpose,
                     double max_error, const std::function<bool()>& should_stop, Decision& decision);

@@ -117,7 +117,7 @@ class RoundedSearch {
     for (uint32_t i = 0; i < 4; ++i) cache.pairs[i] = point.pairs[i < point.count ? i : 0];
   }
 
-  // The walk does not notice that it surrounds the origin.
+  // The walk may surround the origin without noticing.
   bool FindOverlapOfCores(const PlainVector& n, PairCache* cache) {
     const FloatSearchResult found = SearchInFloatingPoint(pair_, 0, n);
     decision_.directions_tried += found.directions_tried;

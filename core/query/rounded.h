@@ -11,13 +11,13 @@
 
 namespace hulld {
 
-// Decides the relation of two rounded hulls, not both of radius 0: the sign of the separation of
-// their cores minus the sum of the radii. The rungs are those of Decide: bounding spheres, also
-// from inside; the suggestion of the cache; the cores in floating point; exact arithmetic. Fills
-// the relation, the rung, and directions_tried of `decision`, which must be newly constructed.
-// Requires: tolerance >= 0. Updates the cache, which may be null and otherwise belongs to these
-// rounded hulls. CANCELLED: should_stop, which may be empty, returned true; only the exact rung
-// polls it.
+// Decides the relation of two rounded hulls, at least one of which has a radius: the sign of the
+// separation of their cores minus the sum of the radii. The rungs are as in Decide: bounding
+// spheres, including inscribed ones; the suggestion of the cache; the cores in floating point;
+// exact arithmetic. Fills the relation, the rung, and directions_tried of `decision`, which must be
+// newly constructed. Requires: tolerance >= 0. Updates the cache, which may be null and otherwise
+// must belong to these rounded hulls. CANCELLED: should_stop, which may be empty, returned true;
+// only the exact rung polls it.
 absl::Status DecideRounded(const FloatPair& pair, double tolerance, PairCache* cache,
                            const std::function<bool()>& should_stop, Decision& decision);
 

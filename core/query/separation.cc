@@ -74,9 +74,9 @@ int SignOf(Relation relation) {
 // The radius of a rounded hull, within u of itself.
 double RadiusOf(const PlacedHull& placed) { return placed.radii()[0] + placed.radii()[1]; }
 
-// Searches the separation of the cores. That of the rounded hulls is less by the sum of their
-// radii, and attained in the same direction: the reach of A - B along each unit vector grows by
-// that sum.
+// Finds the separation of the cores. The separation of the rounded hulls is less by the sum of
+// their radii and is attained in the same direction, because that sum increases the reach of A - B
+// along each unit vector equally.
 class SeparationSearch {
  public:
   SeparationSearch(const FloatPair& pair, const Decision& decision, Relation relation, bool cold,
@@ -216,8 +216,8 @@ class SeparationSearch {
   }
   std::span<const VertexPair> start() const { return std::span(start_pairs_).first(start_count_); }
 
-  // Finds bounds in floating point, as close to the goal as it allows. Exact arithmetic starts from
-  // the vertices that this visits.
+  // Finds bounds as close to the goal as floating point allows. Exact arithmetic starts from the
+  // vertices visited here.
   void Bound(const SeparationGoal& goal, bool want_point) {
     if (!pair_.usable()) return;
     if (core_ == Relation::kSeparated) {
@@ -277,7 +277,8 @@ class SeparationSearch {
     return met ? std::optional(found) : std::nullopt;
   }
 
-  // Returns the separation from bounds of that of the cores. Requires: finite bounds.
+  // Returns the separation, from the bounds on the separation of the cores. Requires: finite
+  // bounds.
   Separation FromBounds() const {
     const Separation cores = WithSign(MiddleOf(bounds_));
     if (radii_.is_zero()) return cores;
@@ -379,9 +380,9 @@ class SeparationSearch {
     return true;
   }
 
-  // Adds the normal. Returns false if its bound would exceed kMaxNormalAngle. Outside facets only
-  // that of a separated pair is known: the direction from a point v of A - B, as computed, to the
-  // origin. Some point p of A - B is within kCombinationErrorFactor of v and no longer than the
+  // Adds the normal. Returns false if its bound would exceed kMaxNormalAngle. Outside facets, only
+  // the normal of a separated pair is known: the direction from a point v of A - B, as computed, to
+  // the origin. Some point p of A - B is within kCombinationErrorFactor of v and no longer than the
   // upper bound, so the angle between p and the nearest point follows from both bounds, and that
   // between v and p from their distance.
   bool AddFloatNormal(SeparationAnswer& answer) const {

@@ -15,7 +15,7 @@
 
 namespace hulld {
 
-// The details of the signed separation to compute.
+// The details of the separation to compute.
 struct SeparationRequest {
   bool separation = false;
   bool witness = false;
@@ -41,9 +41,10 @@ struct SeparationAnswer {
 
 // Fills `answer` from floating point with a proven bound if that is close enough, and otherwise
 // from exact arithmetic, rounded. The values depend on the pair alone, not on the path to the
-// relation. `decision`: of the cores. `relation`: of the rounded hulls; equals the decision's
-// relation if there are no radii. Requires: relations other than kWithinTolerance. `cold`: true if
-// no cache helped the decision and its search had SearchErrorFor, so that its pairs may be used.
+// relation. `decision`: for the cores. `relation`: of the rounded hulls, which equals the
+// decision's relation if there are no radii. Requires: relations other than kWithinTolerance.
+// `cold`: true if no cache helped the decision and its search had SearchErrorFor, so that its pairs
+// may be used.
 // CANCELLED: should_stop, which may be empty, returned true. RESOURCE_EXHAUSTED: DepthTooLarge.
 absl::Status FindSeparation(const FloatPair& pair, const Decision& decision, Relation relation,
                             bool cold, const SeparationRequest& request,

@@ -201,7 +201,7 @@ class AxisTable {
   // Returns the sign of min n.B - max n.A.
   int SignOfGap(const IntegerVector& n) { return -Sign(Dot(n, exact().Farthest(n).w)); }
 
-  // Parallel edges have no axis.
+  // Parallel edges define no axis.
   Gap ExactGap(const IntegerVector& n) {
     if (IsZero(n)) return Gap::kOverlap;
     const int sign = std::max(SignOfGap(n), SignOfGap(-n));

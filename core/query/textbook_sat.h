@@ -13,7 +13,7 @@
 
 namespace hulld {
 
-// The textbook separating axis test with exact signs: reference, oracle and baseline.
+// The textbook separating-axis test with exact signs, as a reference, an oracle, and a baseline.
 //
 // Candidate axes, in this order: facet normals of A, facet normals of B, cross products of the
 // edges of A with the edges of B (edge of A major) and, if A - B is flat, its normals and the

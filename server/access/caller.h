@@ -17,10 +17,10 @@ const char* RoleName(Permission permission);
 // The caller of a call, with its rights. The default is the caller of a server without tokens, with
 // all rights.
 struct Caller {
-  // The token's name, which is no secret; empty without tokens.
+  // The token's name, which is not secret; empty without tokens.
   std::string name;
   Permission permission = Permission::kAdmin;
-  // Prefix of all visible IDs: ends in "/", or is empty for all IDs.
+  // Prefix of all visible IDs: ends with "/", or is empty for all IDs.
   std::string prefix;
   // Distinguishes successive tokens with the same name. Never shown.
   uint64_t token = 0;

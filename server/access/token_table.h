@@ -20,7 +20,7 @@ namespace hulld::server {
 //   camera-1  read-write cell-1/ sha256:9f86d081...b0f00a08
 //   dashboard read-only  *       sha256:60303ae2...8c11c752
 //
-// name: letters, digits, ".", "_" and "-", 64 at most, unique. role: read-only, read-write or
+// name: at most 64 letters, digits, ".", "_", and "-"; unique. role: read-only, read-write or
 // admin. prefix: the prefix of all visible IDs, ending in "/"; "*" for all IDs. hash: SHA-256 of
 // the token, 64 hexadecimal digits. Blank lines and lines that start with "#" are ignored.
 //

@@ -20,8 +20,8 @@ std::unique_ptr<grpc::Service> MakeStatusService(const ServiceParts& parts);
 std::unique_ptr<grpc::Service> MakeMaintenanceService(const ServiceParts& parts);
 
 // grpc.reflection.v1alpha.ServerReflection: lists the services for tools such as grpcurl. It needs
-// no token, since the contract is no secret. Its streams count toward --max-streams-per-client and
-// occupy no thread while they wait. services: full names of the services to list. The admission
+// no token, because the contract is not secret. Its streams count toward --max-streams-per-client
+// and occupy no thread while they wait. services: full names of the services to list. The admission
 // must outlive the service.
 std::unique_ptr<grpc::Service> MakeReflectionService(Admission& admission,
                                                      std::vector<std::string> services);

@@ -25,7 +25,7 @@ HealthCheckResponse ResponseOf(HealthCheckResponse::ServingStatus status) {
 
 }  // namespace
 
-// One Watch: reports the status at its start and at the end of service.
+// A Watch call: reports the status when it starts and when the server stops serving.
 class HealthService::WatchCall
     : public RequestStream<QueuedStream<WriteReactor, HealthCheckResponse>, HealthCheckRequest> {
  public:

@@ -27,8 +27,8 @@ class CallLifetime {
   // The client's deadline.
   Clock::time_point deadline() const { return deadline_; }
 
-  // Ends the call after `limit` (--max-request-time) from now; zero: never. A stream of unlimited
-  // duration restarts the limit with every message.
+  // Ends the call after `limit` (--max-request-time) from now; zero means never. A stream of
+  // unlimited duration restarts the limit with every message.
   void LimitTime(std::chrono::milliseconds limit) {
     limit_.store(limit, std::memory_order_relaxed);
     const bool unlimited = limit == std::chrono::milliseconds::zero();

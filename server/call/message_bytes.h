@@ -10,8 +10,8 @@
 
 namespace hulld::server {
 
-// Messages as gRPC carries them. Calls exchange bytes instead of messages, because gRPC would parse
-// a request before authentication and without a limit.
+// Serialized messages, as gRPC transports them. Calls exchange bytes instead of messages, because
+// gRPC would parse a request before authentication and without a limit.
 
 using Bytes = grpc::ByteBuffer;
 using CallContext = grpc::CallbackServerContext;

@@ -9,7 +9,7 @@
 
 namespace hulld::server {
 
-// Memory of all parsed requests that are not answered yet, bounded by --request-memory, so that
+// Memory of all parsed requests that are not answered yet. Bounded by --request-memory, so that
 // many callers together cannot exhaust the machine's memory. Thread-safe.
 class RequestMemory {
  public:

@@ -39,7 +39,7 @@ constexpr size_t kPairsPerClaim = 16;
 constexpr int kMaxShortUpdate = 4096;
 // An update that affects at most this many pairs is answered on arrival.
 constexpr int kMaxQuickPairs = 8;
-// A stream is opened for many updates. The number is a guess.
+// Expected number of updates per stream: a guess, because streams are opened for many updates.
 constexpr uint64_t kExpectedUpdates = 256;
 // An index among the pairs, as a varint.
 constexpr size_t kIndexBytes = 5;

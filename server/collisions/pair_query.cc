@@ -122,8 +122,8 @@ class PairQuery : public std::enable_shared_from_this<PairQuery> {
     parts_.readers.Submit(answer, call_->call().client());
   }
 
-  // As AnswerLater, but on this thread. Returns false without blocking if it would have to wait or
-  // build.
+  // Like AnswerLater, but on this thread. Returns false, without blocking, if it would have to wait
+  // or build.
   bool TryAnswer() {
     ReadPlan plan = plan_;
     plan.may_wait = false;

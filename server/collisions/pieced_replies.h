@@ -81,8 +81,8 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   using Base = RequestStream<QueuedStream<WriteReactor, Reply>, Request>;
   using Clock = std::chrono::steady_clock;
 
-  // Unsent bytes above which no slice starts. A choice: several messages, so that the threads need
-  // not wait for gRPC's threads.
+  // Unsent bytes above which no slice starts: several messages, so that the threads need not wait
+  // for gRPC's threads. Not tuned.
   static constexpr size_t kMaxUnsentBytes = size_t{4} * Config::kReplyMessageBytes;
   // Maximum bytes held by a piece that waits for an earlier one.
   static constexpr size_t kMaxHeldBytes = Config::kReplyMessageBytes / 4;

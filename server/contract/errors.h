@@ -63,7 +63,7 @@ absl::Status LimitExceeded(const std::string& what, const std::string& limit,
                            const std::string& flag);
 absl::Status LimitExceeded(const std::string& what, uint64_t limit, const std::string& flag);
 
-// As LimitExceeded, with the reason OVERLOADED: other calls have used up the limit, and the same
+// Like LimitExceeded, with the reason OVERLOADED: other calls have used up the limit, and the same
 // request may succeed after `retry`.
 absl::Status Overloaded(const std::string& what, uint64_t limit, const std::string& flag,
                         std::chrono::milliseconds retry);

@@ -17,7 +17,7 @@ inline bool Stopped(const std::function<bool()>& should_stop) {
 
 inline absl::Status Cancelled() { return absl::CancelledError("the call was cancelled"); }
 
-// Interval at which a waiting thread polls should_stop; a choice.
+// Interval at which a waiting thread polls should_stop. Not tuned.
 constexpr std::chrono::milliseconds kStopPoll(20);
 
 }  // namespace hulld::server

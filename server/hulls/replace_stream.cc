@@ -100,7 +100,7 @@ class ReplaceStream : public ReadingStream<CallStream<ReadReactor>, v1::ReplaceH
         replacement_.builder->Add(*points, {static_cast<size_t>(limits.max_vertices_per_hull),
                                             [this] { return call().ShouldStop(); }});
     if (absl::IsResourceExhausted(added.status())) {
-      return LimitExceeded(name + "the hull would hold too many vertices",
+      return LimitExceeded(name + "the hull would have too many vertices",
                            limits.max_vertices_per_hull, "max-vertices-per-hull");
     }
     if (!added.ok()) return Prefixed(name, added.status());

@@ -89,8 +89,8 @@ class WatchStream : public RequestStream<PulledStream<WriteReactor, v1::WatchHul
     if (const auto watch = watch_.exchange(nullptr)) parts_.registry.feed().Close(watch);
   }
 
-  // Opens the watch. It includes all changes that this server or a peer server acknowledged before
-  // the call.
+  // Opens the watch, which includes all changes that this server or a peer server acknowledged
+  // before the call.
   absl::Status Begin() {
     HULLD_ASSIGN_OR_RETURN(const WatchTarget target, ReadTarget());
     if (request().after_revision() > 0 && request().store_id().empty()) {

@@ -14,7 +14,7 @@
 namespace hulld::server {
 namespace {
 
-// Limits of a transaction: vertices (24 MB), or changes of hulls and bodies. A choice.
+// Limits of a transaction: vertices (24 MB), or changes of hulls and bodies. Not tuned.
 constexpr size_t kMaxVertices = 1'000'000;
 constexpr size_t kMaxChanges = 1000;
 
@@ -50,7 +50,7 @@ absl::StatusOr<std::vector<WriterSequence>> ReadWriters(Store& store, const Stor
   if (!writers.ok() || writers->size() == hull.writer_count) return writers;
   return absl::DataLossError(absl::StrCat("hull \"", hull.record.hull_id, "\" has ",
                                           writers->size(), " writers in store ", store.id(),
-                                          ", not ", hull.writer_count, " as its record says"));
+                                          ", not ", hull.writer_count, " as its record states"));
 }
 
 }  // namespace

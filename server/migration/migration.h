@@ -17,7 +17,7 @@
 
 namespace hulld::server {
 
-// Source of a copy: a store at a revision.
+// The source of a copy: a store at a revision.
 struct MigrationSource {
   std::string store_id;
   uint64_t revision = 0;
@@ -46,7 +46,7 @@ class MigrationTarget {
 
 // INVALID_ARGUMENT, FAILED_PRECONDITION, UNAVAILABLE: as RocksDbStore::Open.
 absl::StatusOr<std::unique_ptr<MigrationTarget>> OpenRocksDbTarget(const std::string& data_dir);
-// As PostgresStore::Open; CANCELLED: a server is active on the database.
+// Like PostgresStore::Open; CANCELLED: a server is active on the database.
 absl::StatusOr<std::unique_ptr<MigrationTarget>> OpenPostgresTarget(const std::string& conninfo);
 
 struct MigrationCounts {

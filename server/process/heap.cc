@@ -11,13 +11,13 @@
 namespace hulld::server {
 namespace {
 
-// Free bytes that malloc may keep. A choice: ordinary work leaves less free.
+// Free bytes that malloc may keep: more than ordinary work leaves free. Not tuned.
 constexpr size_t kWorthIt = 64 << 20;
-// Blocks of at least this size are mapped and unmapped individually. A choice: above the lists of a
-// message of a few MiB, which double as they grow.
+// Blocks of at least this size are mapped and unmapped individually. Above the size of the lists of
+// a message of a few MiB, which double as they grow. Not tuned.
 constexpr int kMappedBytes = 8 << 20;
-// Bytes that an arena may keep free at its end. A choice: the memory of a call with a message of a
-// few MiB.
+// Bytes that an arena may keep free at its end: the memory of a call with a message of a few MiB.
+// Not tuned.
 constexpr int kKeptBytes = 32 << 20;
 
 }  // namespace

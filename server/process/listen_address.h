@@ -34,8 +34,8 @@ absl::Status CheckExposure(const ListenAddress& address, bool has_tls, bool inse
 // for TCP.
 absl::Status CheckSocketFree(const ListenAddress& address);
 
-// UNAVAILABLE with a remedy: the address cannot be bound. error: the errno; 0: the host cannot be
-// resolved. cause: its text.
+// Returns UNAVAILABLE, with a remedy, for an address that cannot be bound. error: the errno, or 0
+// if the host cannot be resolved. cause: the text of the error.
 absl::Status BindFailure(const ListenAddress& address, int error, const std::string& cause,
                          const char* flag = "--listen");
 

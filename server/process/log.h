@@ -18,8 +18,8 @@ namespace hulld::server {
 // (UTC, RFC 3339), level and message, and the fields of LogEvent.
 void SetUpLog(const std::string& level, const std::string& format);
 
-// Limits the log lines per period: clients that send malformed messages make libraries log a line
-// for each. Thread-safe.
+// Limits the number of log lines per period, because libraries log a line for each malformed
+// message of a client. Thread-safe.
 class LineBudget {
  public:
   using Clock = std::chrono::steady_clock;

@@ -48,7 +48,7 @@ Family<prometheus::Histogram>& AddHistograms(prometheus::Registry& registry, con
 StoreMetrics AddStore(prometheus::Registry& registry) {
   return {
       AddHistograms(registry, "hulld_store_commit_duration_seconds",
-                    "Time from submitting a change to the store to its acknowledgment.")
+                    "Time from submitting a change to the store to its acknowledgement.")
           .Add({}, LatencyBuckets()),
       AddHistograms(registry, "hulld_store_commit_changes", "Changes per committed write.")
           .Add({}, CountBuckets()),

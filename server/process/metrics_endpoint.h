@@ -14,9 +14,9 @@ namespace hulld::server {
 // INVALID_ARGUMENT: --metrics-address is malformed, or not local although `exposed` is false.
 absl::StatusOr<ListenAddress> ParseMetricsAddress(const std::string& address, bool exposed);
 
-// HTTP endpoint for Prometheus: GET /metrics, neither encrypted nor authenticated. One thread
-// serves a bounded number of connections that do not delay each other: Requests have no body, a few
-// KiB at most, and a time limit.
+// HTTP endpoint for Prometheus: GET /metrics, neither encrypted nor authenticated. A single thread
+// serves a bounded number of connections. They do not delay each other, because requests have no
+// body, have at most a few KiB, and are limited in time.
 class MetricsEndpoint {
  public:
   // address: "host:port" or "[v6]:port"; port 0 picks a free one. exposed: true if other machines

@@ -32,8 +32,8 @@ class TaskPool {
   };
 
  public:
-  // Duration of a slice. A choice: the answer of a single call takes about as long over the wire,
-  // and a task switch (**observed**: 2 us) costs a hundredth.
+  // Duration of a slice: about the time that the answer of a single call takes over the wire, and a
+  // hundred times the cost of a task switch (**observed**: 2 us). Not tuned.
   static constexpr std::chrono::microseconds kSliceTime{250};
   // While single calls arrive, and for this long afterwards, slices leave one thread's core to
   // them: the system runs a computing thread for a few milliseconds (a tick of Linux is 1 to 10 ms)

@@ -107,7 +107,7 @@ absl::StatusOr<Resolved> ResolvePlaced(Registry& registry, std::span<const std::
                                        const PlacedLookup& lookup,
                                        const std::function<bool()>& should_stop);
 
-// As ResolvePlaced, for a reader that repeatedly resolves the same IDs: `known` persists between
+// Like ResolvePlaced, for a reader that repeatedly resolves the same IDs: `known` persists between
 // calls, and only hulls changed since are looked up. The points of inline shapes are not needed
 // after the first call.
 absl::StatusOr<Resolved> RefreshPlaced(Registry& registry, std::span<const std::string> ids,

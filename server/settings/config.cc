@@ -422,9 +422,10 @@ class Parser {
              "Open connections; beyond the limit, the one that has been idle longest is closed");
     AddLimit("max-connections-per-address", limits.max_connections_per_address,
              "Open connections of one address, IPv6 by its first 64 bits; unix sockets are exempt");
-    AddLimit("max-anonymous-calls", limits.max_anonymous_calls,
-             "Open streams without a token: reflection, and watches of health after a connection's "
-             "first");
+    AddLimit(
+        "max-anonymous-calls", limits.max_anonymous_calls,
+        "Open streams that need no token: reflection, and health watches beyond the first of a "
+        "connection");
     AddLimit("max-calls", limits.max_calls, "Concurrent calls, including open streams");
     AddLimit("max-waiting-calls", limits.max_waiting_calls,
              "Calls waiting for a thread; more are refused");

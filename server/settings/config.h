@@ -47,8 +47,8 @@ struct Limits {
   // and about 50 KB. Unix sockets have no limit per address.
   uint64_t max_connections = 4096;
   uint64_t max_connections_per_address = 512;
-  // Running calls that need no token: reflection, and watches of health beyond the first of a
-  // connection. One client may use one in kAnonymousShare of them.
+  // Running calls that need no token: reflection, and health watches beyond the first of a
+  // connection. A client may use one in kAnonymousShare of them.
   uint64_t max_anonymous_calls = 64;
   static constexpr uint64_t kAnonymousShare = 8;
   // Running calls, including open streams; and running calls that wait for a thread.
@@ -82,7 +82,7 @@ struct Config {
   // Allows addresses that other machines can reach without TLS.
   bool insecure = false;
   // PEM files: the server's certificate with the chain to its authority, its private key, and the
-  // authorities of clients. The last one requires a certificate of every client.
+  // authorities of clients. If the last is set, every client must present a certificate.
   std::string tls_cert;
   std::string tls_key;
   std::string tls_client_ca;
@@ -163,7 +163,7 @@ struct CommandLine {
   std::string settings;
 };
 
-// Looks up an environment variable; nullopt when it is not set.
+// Looks up an environment variable; nullopt if it is not set.
 using Environment = std::function<std::optional<std::string>(const std::string&)>;
 
 // The variables of this process.

@@ -55,8 +55,8 @@ uint64_t MinGroupLimit(const fs::path& root, const std::string& controller,
   return least;
 }
 
-// A quota of time per period, both in microseconds, in thousandths of a processor. A quota of -1,
-// in version 1, is none.
+// Converts a quota of time per period, both in microseconds, to thousandths of a processor. In
+// version 1, a quota of -1 means no limit.
 uint64_t Thousandths(double quota, double period) {
   if (!(quota > 0 && period > 0)) return kNoGroupLimit;
   return static_cast<uint64_t>(std::max(1.0, std::round(1000 * quota / period)));

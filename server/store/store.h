@@ -21,7 +21,7 @@ namespace hulld::server {
 // Durability of a committed change.
 enum class Durability {
   kMemory,   // lost when the server ends
-  kRelaxed,  // survives a crash of the server; of the machine only after some time
+  kRelaxed,  // survives a crash of the server, but a crash of the machine only after some time
   kSync,     // on disk: survives both
 };
 
@@ -273,8 +273,8 @@ class Store {
   virtual PeerFeed* peers() { return nullptr; }
 
   // Registers a callback that runs, on any thread, when a peer has taken over the store, so that
-  // this server can neither commit nor read; immediately if that has happened. The process must end
-  // then.
+  // this server can neither commit nor read; immediately if that has already happened. The process
+  // must then end.
   virtual void OnEnded(std::function<void()> /*ended*/) {}
 
   // Returns true if the next change should write a new base instead of a delta of `new_vertices`:

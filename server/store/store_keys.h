@@ -30,7 +30,7 @@ namespace hulld::server {
 //   d<incarnation><revision>             vertices of a delta
 //   p<body ID>                           a StoredBody
 //
-// An incarnation is a create_revision. Every value ends in the CRC-32 of key and value, so that
+// An incarnation is a create_revision. Every value ends with the CRC-32 of key and value, so that
 // readers recognize a value that is damaged or belongs to another key.
 
 // Version of this format. A store without bodies may be in format 1, which is the same otherwise. A

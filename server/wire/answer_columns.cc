@@ -68,7 +68,7 @@ size_t AddNumbers(const Answer* answer, const v1::Wanted& wanted, v1::AnswerColu
   return bytes;
 }
 
-// As EncodeAxis, but leaves the pair without an answer if a feature is too large.
+// Like EncodeAxis, but leaves the pair without an answer if a feature is too large.
 size_t AddAxis(const SeparatingAxis& found, const Hull& a, const Hull& b,
                v1::AnswerColumns* columns) {
   v1::Axis* const axis = columns->mutable_axes(columns->axes_size() - 1);

@@ -25,10 +25,10 @@ size_t FullMessageBytes(const v1::Wanted& wanted);
 size_t AddAnswer(const absl::StatusOr<Answer>& answer, const QueryHull& a, const QueryHull& b,
                  const v1::Wanted& wanted, v1::AnswerColumns* columns);
 
-// As AddAnswer if only the relation is wanted.
+// Like AddAnswer if only the relation is wanted.
 size_t AddRelation(const Answer& answer, v1::AnswerColumns* columns);
 
-// As AddAnswer for a call with motions.
+// Like AddAnswer for a call with motions.
 size_t AddFirstContact(const FirstContact& contact, const QueryHull& a, const QueryHull& b,
                        const v1::Wanted& wanted, v1::AnswerColumns* columns);
 // Adds the times of the last row if it has no answer.

@@ -16,7 +16,7 @@ class CsvReporter : public benchmark::BenchmarkReporter {
  public:
   bool ReportContext(const Context& context) override;
   void ReportRuns(const std::vector<Run>& runs) override;
-  // Writes the file: rows may have different counters, so that the columns are known only now.
+  // Writes the file. Rows may have different counters, so the columns are known only at the end.
   void Finalize() override;
 
  private:

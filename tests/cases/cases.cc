@@ -184,7 +184,7 @@ void AddDegenerateHulls(std::vector<Case>* cases) {
                     0,
                     {1, 0, 0, 0},
                     4});
-  // Points of a vertical plane, far from the origin; the probe is (4, -3, 0) from it.
+  // Points in a vertical plane, far from the origin; the probe is (4, -3, 0) from it.
   const double x = 2'097'152.5;
   const double y = 1'048'576.25;
   cases->push_back({"mikedh/trimesh#1784",

@@ -51,7 +51,7 @@ class Watches : public server::ServerTest {
     server_.reset();
     std::filesystem::remove_all(directory_);
   }
-  // Sets a patience of 2 s, and a clock that advances only by the test and while the client waits.
+  // Sets a patience of 2 s, and a clock that only the test and the client's waits advance.
   void UseOwnClock() {
     options_.timeout = std::chrono::seconds(2);
     options_.retry.now = [this] {

@@ -25,7 +25,8 @@ struct Certificate {
 // no direction, and at most six pairs, with 0 strictly inside the hull of their differences.
 std::string FaultOf(const Certificate& certificate, Relation relation, const WorldPoints& points);
 
-// As FaultOf for hulls with radii, at least one of them not 0. `radii`: their exact sum is r.
+// Like FaultOf, but for hulls with radii, at least one of them not 0. `radii`: their exact sum is
+// r.
 std::string FaultOfRounded(const Certificate& certificate, Relation relation,
                            std::span<const Point> a, const Placement& X_WA,
                            std::span<const Point> b, const Placement& X_WB,

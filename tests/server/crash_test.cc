@@ -326,7 +326,7 @@ TEST_F(Interrupted, DisconnectedClientsLeaveWholeChunks) {
   ExpectHullOf("interrupted/client", blocks);
 }
 
-TEST_F(Interrupted, AServerStoppedInTheMiddleOfABatchEndsItAndItself) {
+TEST_F(Interrupted, AServerStoppedDuringABatchEndsTheBatchAndExits) {
   for (const int signal : {SIGTERM, SIGKILL}) {
     StartServer({"--drain-timeout", "0.1"});
     const Client client = MakeClient();

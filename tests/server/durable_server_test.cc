@@ -105,7 +105,7 @@ TEST_F(DurableServer, FailuresOfTheStoreShowInMetrics) {
   TearDown();
 }
 
-TEST_F(DurableServer, AcksSayThatTheChunkIsOnDisk) {
+TEST_F(DurableServer, AcksStateThatTheChunkIsOnDisk) {
   Appender appender(*hulls_, "h", "w", true);
   EXPECT_EQ(appender.Append(1, Cube())->durability(), v1::DURABILITY_SYNC);
   EXPECT_TRUE(appender.Finish().ok());

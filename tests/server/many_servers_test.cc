@@ -181,7 +181,7 @@ TEST_F(ManyServers, ServersStartedTogetherOverAnEmptyDatabaseServeOneStore) {
 // Two servers append to a hull concurrently while a third is queried; the first sometimes loses its
 // notifications of peer changes. Every answer is proven, and at the end all servers agree with a
 // server that received all points together.
-TEST_F(ManyServers, AHullThatGrowsThroughSeveralIsTheHullOfAllTheirPoints) {
+TEST_F(ManyServers, AHullThatGrowsThroughSeveralServersIsTheHullOfAllPoints) {
   constexpr int kRounds = 60;
   PostgresCluster& cluster = PostgresCluster::Shared();
   const std::string database = cluster.MakeDatabase();

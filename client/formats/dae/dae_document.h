@@ -21,7 +21,7 @@ namespace hulld {
 // A COLLADA document: XML elements that refer to each other by ID. Ignores namespace prefixes.
 // Expands only the entities that XML predefines. Sources: Khronos, COLLADA 1.4.1 and 1.5 (2008).
 //
-// Stores the first error. After an error, functions return empty or zero results, and callers stop.
+// Keeps the first error. After an error, functions return empty or zero results, and callers stop.
 class DaeDocument {
  public:
   // source: must outlive this.

@@ -24,7 +24,7 @@ namespace {
 using pugi::xml_node;
 using Vector = std::array<double, 3>;
 
-// Limits for files whose nodes instantiate each other very many times.
+// Limits for files whose nodes instantiate each other excessively.
 constexpr int kMaxLevels = 256;
 constexpr size_t kMaxElements = size_t{1} << 20;
 constexpr size_t kMaxCorners = size_t{1} << 28;

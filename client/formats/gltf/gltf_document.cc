@@ -20,8 +20,8 @@ using google::protobuf::ListValue;
 using google::protobuf::Struct;
 using google::protobuf::Value;
 
-// True for extensions that affect only the appearance of surfaces, and for the one that is
-// implemented.
+// True for extensions that affect only the appearance of surfaces, and for the implemented
+// extension.
 bool IsKnownExtension(const std::string& name) {
   for (const char* prefix : {"KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_",
                              "KHR_lights_punctual", "KHR_mesh_quantization"}) {

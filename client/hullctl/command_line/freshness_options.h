@@ -6,8 +6,8 @@
 
 namespace hulld {
 
-// Declares --max-staleness and --at-least for a command that reads. They set invocation->freshness,
-// which applies to all reads of the command.
+// Declares --max-staleness and --at-least for a read command. They set invocation->freshness, which
+// applies to all reads of the command.
 void AddFreshnessOptions(Command command, Invocation* invocation);
 
 }  // namespace hulld

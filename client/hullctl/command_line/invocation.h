@@ -46,7 +46,7 @@ struct Invocation {
   std::string context;
   // True if the command uses a server.
   bool needs_server = true;
-  // True: uses a temporary server that ends with the command.
+  // Uses a temporary server that ends with the command.
   bool local = false;
   // The effective settings with their sources, then the values derived from them. See
   // ResolveConnection.

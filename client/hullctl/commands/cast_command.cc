@@ -229,7 +229,7 @@ void AddCastCommand(Command program, Invocation* invocation) {
   AddTriple(command, "ORIGIN", &arguments->origin, "Start of the ray, x,y,z");
   AddTriple(command, "DIRECTION", &arguments->direction,
             "Vector from the start of the ray to its end, x,y,z");
-  command.AddText("PREFIX", &arguments->prefix, "Only hulls whose IDs start with this")
+  command.AddText("PREFIX", &arguments->prefix, "Only hulls whose IDs start with this prefix")
       .Completes(ValueKind::kHull);
   AddFreshnessOptions(command, invocation);
   command.SetDetails(

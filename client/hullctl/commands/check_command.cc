@@ -296,8 +296,8 @@ absl::Status RefuseConflicts(const PairArguments& arguments) {
   return absl::OkStatus();
 }
 
-// Returns the error. If the server does not know an ID that looks like the name of a file, adds why
-// no file of that name was read.
+// Returns the error. If an unknown ID looks like a file name, adds an explanation why no file of
+// that name was read.
 absl::Status WithFileHint(const absl::Status& error, const PairArguments& arguments) {
   for (const std::string& name : {arguments.a, arguments.b}) {
     const std::string missing = absl::StrCat("hull ", Quoted(name), " not found");
@@ -449,7 +449,7 @@ void AddCheckCommand(Command program, Invocation* invocation) {
       "\n"
       "--to-a and --to-b define a motion, from time 0 to time 1, with quaternion and translation\n"
       "linear in time. Of the two quaternions of the end rotation, hullctl picks the one with the\n"
-      "shorter path. The relation covers all times, and contact is never missed.");
+      "shorter path. The relation covers all times, and no contact is missed.");
   command.SetExamples(
       {{"Do they collide?", "hullctl check arm box --pose-b 0.2,0,0"},
        {"How far apart are they, and where?",

@@ -8,7 +8,7 @@
 
 namespace hulld {
 
-// Each declares one command of `program`; parsing sets invocation->action if it is given.
+// Each declares a command of `program`. If the command is given, parsing sets invocation->action.
 // `invocation` must outlive the action.
 void AddCreateCommand(Command program, Invocation* invocation);
 void AddAppendCommand(Command program, Invocation* invocation);

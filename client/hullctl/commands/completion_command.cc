@@ -57,7 +57,7 @@ ExitCode WriteManPages(const Invocation& run, const std::string& folder) {
 
 void AddCompletionCommand(Command program, Invocation* invocation) {
   auto shell = std::make_shared<std::string>();
-  Command command = program.AddCommand("completion", "Print the completion script of a shell");
+  Command command = program.AddCommand("completion", "Print the completion script for a shell");
   command.AddText("SHELL", shell.get(), "The shell").Required().OneOf({"bash", "zsh", "fish"});
   command.SetDetails(
       "The script completes commands, options, values, names of contexts, and IDs of hulls. For\n"

@@ -206,7 +206,7 @@ void AddContextCommand(Command program, Invocation* invocation) {
   show.AddText("NAME", &arguments->name, "Show the settings as with --context NAME")
       .Completes(ValueKind::kContext);
   show.OnGiven(act([=] { return Show(*invocation, *arguments); }));
-  Command remove = command.AddCommand("remove", "Forget a context");
+  Command remove = command.AddCommand("remove", "Remove a context");
   remove.AddText("NAME", &arguments->name, "Name of the context")
       .Required()
       .Completes(ValueKind::kContext);

@@ -106,7 +106,7 @@ void AddCreateCommand(Command program, Invocation* invocation) {
   auto options = std::make_shared<CreateOptions>();
   Command command = program.AddCommand("create", "Register an empty hull");
   command.AddText("ID", &options->hull_id, "ID of the hull, such as arm/3").Required();
-  command.AddFlag("--if-absent", &options->if_absent, "Succeed if the hull exists");
+  command.AddFlag("--if-absent", &options->if_absent, "Succeed if the hull already exists");
   command.SetExamples({{"", "hullctl create arm/3"},
                        {"In a script that can run twice", "hullctl create arm/3 --if-absent"}});
   command.OnGiven([=] {

@@ -200,8 +200,8 @@ void AddCheck(Command scene, const std::string* scene_file, Invocation* invocati
   AddFreshnessOptions(command, invocation);
   command.SetDetails(
       "If the file names pairs, answers each, as 'hullctl batch' does. Otherwise finds all pairs\n"
-      "that collide or are within the clearance, as 'hullctl scene FILE' does. Hulls and bodies\n"
-      "are those of the server; 'hullctl scene apply' creates them.");
+      "that collide or are within the clearance, as 'hullctl scene FILE' does. Uses the\n"
+      "hulls and bodies on the server; 'hullctl scene apply' creates them.");
   command.SetExamples({{"", "hullctl scene check cell.yaml --separation"}});
   command.OnGiven([=] {
     invocation->action = [=] {

@@ -451,7 +451,7 @@ void AddViewCommand(Command program, Invocation* invocation) {
       "shows which hulls existed.");
   command.SetExamples(
       {{"All hulls of the server", "hullctl view"},
-       {"All hulls with a prefix, also new ones", "hullctl view cell-3/"},
+       {"All hulls with a prefix, including new ones", "hullctl view cell-3/"},
        {"A hull, and the points, mesh, and hull of a file", "hullctl view arm part.stl"},
        {"A scene", "hullctl view scene.json"},
        {"A robot along a trajectory", "hullctl view arm.urdf --joints path.csv"},

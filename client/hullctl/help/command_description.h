@@ -36,13 +36,13 @@ struct OptionDescription {
 };
 
 struct Example {
-  // Purpose; empty: that of the previous example.
+  // Purpose of the example. If empty, the same as that of the previous example.
   std::string purpose;
   std::string command;
 };
 
-// A program or one of its commands: the source of help, man page, and completion. Filled where the
-// command is declared (command_line/command.h), the only place with this text.
+// A program or one of its commands: the source of its help, man page, and completion. Filled where
+// the command is declared (command_line/command.h), and nowhere else.
 struct CommandDescription {
   // Including the names of parent commands: "hullctl backup save".
   std::string path;

@@ -7,8 +7,9 @@
 namespace hulld {
 
 // Returns `; did you mean "check"?` for a word not in `known`, or nothing if no word is close. A
-// close word starts with it, or is the nearest word within a third of its letters (Levenshtein
-// distance, a swap of adjacent letters counts as one). Case does not count.
+// word is close if it starts with the given word, or if it is the nearest known word and differs in
+// at most a third of the letters (Levenshtein distance, with a swap of adjacent letters as one
+// edit). Case is ignored.
 std::string Suggestion(const std::string& word, const std::vector<std::string>& known);
 
 }  // namespace hulld

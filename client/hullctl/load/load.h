@@ -18,7 +18,7 @@
 namespace hulld {
 
 struct LoadPlan {
-  // End of the run: no request starts after either limit. At least one is set.
+  // End of the run: no request starts after either limit. At least one limit is set.
   std::optional<std::chrono::milliseconds> duration;
   std::optional<uint64_t> requests;
   // Requests per second of all clients together. Absent: each client sends its next request after

@@ -93,7 +93,7 @@ class LoadSubjects::LoadClient {
       case LoadMode::kMixed:
         break;
     }
-    // Eight of ten requests check, one is a batch, and one appends.
+    // Eight of ten requests are checks, one is a batch, and one is an append.
     if (i % 10 == 4) return Batch();
     if (i % 10 == 9) return Append();
     return Check(i);

@@ -27,7 +27,7 @@ struct LoadSettings {
   uint64_t pairs = 10000;
   // Points per chunk of an append.
   uint64_t points = 10000;
-  // ID prefix of all hulls of the load; ends in "/".
+  // ID prefix of all hulls of the load; ends with "/".
   std::string prefix;
 };
 

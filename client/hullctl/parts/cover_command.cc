@@ -32,7 +32,7 @@ class PieceFetcher {
  public:
   explicit PieceFetcher(const Client& client) : client_(client) {}
 
-  // Adds a hull, the pieces of a body, or, for a word that ends in a slash, all hulls with that
+  // Adds a hull, the pieces of a body, or, for a word that ends with a slash, all hulls with that
   // prefix.
   absl::Status Add(const std::string& word) {
     if (word.back() == '/') return AddAll(word);
@@ -191,7 +191,7 @@ void AddCoverCommand(Command program, Invocation* invocation) {
       "triangles are cut in integers of any length, so the list is complete and has no false\n"
       "entries. Distances are computed in floating point: the largest distance for one hull, a\n"
       "lower bound of it for several. Only the surface is checked: a hull that contains it also\n"
-      "contains the interior; several hulls may leave a cavity in a solid. An ID that ends in /\n"
+      "contains the interior; several hulls may leave a cavity in a solid. An ID that ends with /\n"
       "stands for all hulls with this prefix. Triangles count from 0, in the order of the file;\n"
       "polygons are fans of triangles. Triangles that stick out are an answer: exit code 0.");
   command.SetExamples({{"", "hullctl cover bracket bracket.stl"},

@@ -23,7 +23,7 @@
 namespace hulld {
 namespace {
 
-// Range of the slider of an unlimited joint in meters. A choice.
+// Range of the slider of an unlimited joint in meters. Not tuned.
 constexpr double kReach = 2;
 
 // Returns the range of a variable without regard to the waypoints.

@@ -17,8 +17,8 @@ namespace {
 
 constexpr char kYamlHelp[] =
     "A scene in YAML:\n"
-    "  prefix: cell-3/            # of the IDs on the server; one that ends in / belongs to the\n"
-    "                             # scene alone\n"
+    "  prefix: cell-3/            # of the IDs on the server; a prefix that ends with / belongs\n"
+    "                             # to this scene alone\n"
     "  scale: mm                  # default for files: mm, cm, m, in, ft, or a factor\n"
     "  hulls:\n"
     "    bracket: {file: bracket.stl, scale: cm}    # the hull of the file's points\n"
@@ -283,17 +283,18 @@ void AddSceneSyncCommands(Command scene, const std::string* scene_file, Invocati
   };
   const Declared commands[] = {
       {"apply", "Create and update the hulls and bodies of a scene file", ApplyScene,
-       "Creates and replaces hulls, then bodies, one after another, each atomically. Unchanged "
-       "hulls\n"
-       "and bodies are skipped; exact arithmetic decides: each point of the file is in the hull, "
-       "and\n"
-       "each vertex is one of the points. The command can be repeated, also after an "
+       "Creates and replaces hulls, then bodies, one after another, each atomically. Skips "
+       "unchanged\n"
+       "ones. A hull is unchanged if it contains each point of the file and each of its vertices "
+       "is\n"
+       "one of these points, in exact arithmetic. The command can be repeated, for example after "
+       "an\n"
        "interruption.\n"
-       "If the prefix ends in /, hulls and bodies under it that are not in the file are listed "
+       "If the prefix ends with /, hulls and bodies under it that are not in the file are listed "
        "(?),\n"
-       "and deleted with --prune after a confirmation. Those that changed since they were listed "
-       "are\n"
-       "kept, and the exit code is 1.\n",
+       "and --prune deletes them after a confirmation. Those that have changed since they were "
+       "listed\n"
+       "are kept, and the exit code is 1.\n",
        "hullctl scene apply cell.yaml --dry-run"},
       {"diff", "Show differences between the server and a scene file", DiffScene,
        "Prints what 'hullctl scene apply' would do, without changes. Exits with 1 if there are\n"

@@ -71,8 +71,7 @@ inline constexpr uint64_t kMaxPairs = uint64_t{1} << 24;
 
 // Text about scenes in --help.
 inline constexpr char kSceneFileHelp[] =
-    "FILE is a scene in YAML, of which JSON is a subset; 'hullctl scene apply --help' lists all "
-    "keys:\n"
+    "FILE is a scene in YAML or JSON; 'hullctl scene apply --help' lists all keys:\n"
     "  place:\n"
     "    left: {id: arm}                                 # a hull or body of the server\n"
     "    right: {id: box, at: [2, 0, 0]}                 # x, y, z\n"

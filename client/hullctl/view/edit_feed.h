@@ -21,8 +21,8 @@ namespace hulld {
 // Hulls take turns in the order of their oldest edits. Not thread-safe.
 class EditQueue {
  public:
-  // Maximum number of pending coordinates, about 100 MB. A choice: one message of a page has at
-  // most 4 MiB (BridgeOptions::max_message_bytes).
+  // Maximum number of pending coordinates, about 100 MB. A message of a page has at most 4 MiB
+  // (BridgeOptions::max_message_bytes). Not tuned.
   static constexpr size_t kMaxNumbers = size_t{12} << 20;
 
   // Returns true if the edit was accepted: the queue had room.
@@ -43,9 +43,9 @@ class EditQueue {
   size_t numbers_ = 0;
 };
 
-// Applies the edits of a page, each hull's edits in order, on its own thread, and reports the
-// result of each edit to the page. The new hull arrives through the watch. Pending edits may be
-// merged (EditQueue). Thread-safe. Only for `hullctl view --edit`.
+// Applies the edits of a page on its own thread, those of each hull in order, and reports the
+// result of each edit to the page. The page receives the changed hull through the watch. Pending
+// edits may be merged (EditQueue). Thread-safe. Only for `hullctl view --edit`.
 class EditFeed {
  public:
   EditFeed(const Client& client, std::shared_ptr<PageChannel> page);

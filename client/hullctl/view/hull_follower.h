@@ -15,7 +15,7 @@
 namespace hulld {
 
 // Follows changes of hulls on its own thread until destroyed. When a watch ends because its server
-// has been unreachable for too long, another one resumes from its position. If a watch restarts
+// has been unreachable for too long, a new watch resumes from its position. If a watch restarts
 // from scratch, hulls deleted in between are reported as DELETED.
 class HullFollower {
  public:

@@ -29,7 +29,7 @@ struct FileShape {
   // Three indices each.
   std::vector<uint32_t> triangles;
   uint64_t point_count = 0;
-  // The hull of the file, if no server has it, and its name, which is a path and no ID.
+  // The hull of the file, if no server has it, and its name, which is a path rather than an ID.
   std::shared_ptr<const HullMesh> hull;
   std::string hull_name;
 };
@@ -73,7 +73,7 @@ struct ViewJoints {
   };
   std::vector<Joint> joints;
   // Returns the poses of the jointed objects, in order, for a finite value of each joint.
-  // INVALID_ARGUMENT: the values are no configuration.
+  // INVALID_ARGUMENT: the values are not a configuration.
   std::function<absl::StatusOr<std::vector<Pose7>>(const std::vector<double>& values)> poses;
   // Values of the joints at each waypoint.
   std::vector<std::vector<double>> waypoints;

@@ -51,8 +51,8 @@ class Appender:
 
     @property
     def opened(self) -> Opened:
-        """The server's answer to the opening message: the hull, and this writer's last committed
-        sequence."""
+        """The server's answer to the opening message: the hull and this writer's last committed
+        sequence number."""
         if self._state.opened is None:
             raise RuntimeError("the stream is not open yet; enter it, or await open()")
         return self._state.opened
@@ -101,8 +101,8 @@ class Appender:
         chunk, because the first chunk changes the revision.
 
         ValueError, before anything is sent: not points; several chunks with if_revision.
-        HulldError: the error that ended the stream, which may be about an earlier chunk; every
-        later call raises it again.
+        HulldError: the error that ended the stream, which may concern an earlier chunk; every later
+        call raises it again.
         """
         self._append_chunks(pieces(points, if_revision, chunk_bytes), if_revision)
 

@@ -74,11 +74,11 @@ class Client(ClientBase):
     target name, such as "unix:/run/hulld.sock". timeout: seconds for each call, including retries;
     None: unbounded. Each method can override it. For appenders and collision streams, it bounds
     each wait; for watches, the time to reconnect to a lost server. retry: see RetryPolicy. tls:
-    encrypts. token: sent with each call, and never unencrypted to another machine unless `insecure`
-    allows it.
+    encrypts the connection. token: sent with each call, but never unencrypted to another machine
+    unless `insecure` allows it.
 
-    freshness: required freshness of reads if several servers serve one store (see Freshness); None:
-    an answer includes everything acknowledged before the call.
+    freshness: the required freshness of reads when several servers share a store (see Freshness);
+    None: an answer includes everything acknowledged before the call.
 
     Calls raise HulldError (see hulld.errors) if the server refuses them or cannot be reached, and
     ValueError or TypeError if an argument is wrong, before anything is sent. All are safe to repeat
@@ -230,10 +230,10 @@ class Client(ClientBase):
         freshness: Freshness | None = None,
         timeout: float | None = None,
     ) -> Hull:
-        """Sizes, counts, and box of a hull. audit: the server also checks the hull with code
-        independent of the builder. facets: False omits the counts of edges and facets, which
-        require the canonical hull. properties: True adds volume, area, centroid, and inertia
-        tensor. NotFoundError: no such hull.
+        """Sizes, point counts, and bounding box of a hull. audit: the server also checks the hull
+        with code that is independent of the builder. facets: False omits the counts of edges and
+        facets, which require the canonical snapshot. properties: True adds volume, area, centroid,
+        and inertia tensor. NotFoundError: no such hull.
         """
         call = requests.get_hull(hull_id, audit, facets, properties, self._viewer)
         return self._unary(call, timeout, freshness)
@@ -248,8 +248,8 @@ class Client(ClientBase):
         freshness: Freshness | None = None,
         timeout: float | None = None,
     ) -> HullMesh:
-        """The canonical vertices and facets of a hull; with `side`, a simpler hull that is exactly
-        inside it or encloses it.
+        """The canonical vertices and facets of a hull or, with `side`, of a simpler hull that lies
+        exactly inside it or encloses it.
 
         max_vertices: never exceeded; at least the dimension plus one inside, 8 outside. max_error:
         in the caller's length unit; met if the server finds a hull within both limits; otherwise
@@ -404,13 +404,15 @@ class Client(ClientBase):
         separating or touching axis and the features on it), separation (the distance, or minus the
         penetration depth, with a proven bound of at most max_error), witness (a point of each hull
         at which the separation is attained), normal (the direction in which it is attained),
-        clearance (whether the separation is at most this; exact), certificate (the proof of the
+        clearance (an exact decision of separation <= clearance), certificate (the proof of the
         relation), analysis (time, sizes, axes tested). tolerance: allows WITHIN_TOLERANCE if
-        |separation| is at most this; faster, never wrong. Lengths are in the caller's unit.
+        |separation| is at most this, which is faster and never wrong. Lengths are in the caller's
+        unit.
 
-        to_a, to_b: end poses of motions (hulld.Placement); the answer then has first_contact, and
-        of the options above only certificate is allowed. max_time_error: the maximum width of its
-        bracket. resolution: allows WITHIN_TOLERANCE if the least separation of a rotating motion
+        to_a, to_b: end poses of motions (hulld.Placement). The answer then has first_contact, and
+        certificate is the only option above that is allowed. max_time_error: the maximum width of
+        its bracket. resolution: allows WITHIN_TOLERANCE if the least separation of a rotating
+        motion
         is at most this.
 
         NotFoundError: no such hull. InvalidArgumentError: incompatible options.
@@ -532,8 +534,8 @@ class Client(ClientBase):
         freshness: Freshness | None = None,
         timeout: float | None = None,
     ) -> Containment:
-        """Returns whether each point is inside a hull or body, on its boundary, or outside. The
-        answer is exact for the doubles given.
+        """Finds the points that are inside a hull or body, on its boundary, or outside. The answer
+        is exact for the doubles given.
 
         points: n x 3, in the world frame. hull: an ID, or the points of an inline shape. pose: the
         pose of the hull in the world. separation, max_error: as in check_collision; the separation
@@ -578,8 +580,8 @@ class Client(ClientBase):
         the direction is that of the ray.
 
         origins, directions: n x 3; either may have shape (3,), for all rays. placements: as in
-        check_collisions; the pieces of a body must be at the identity pose. Pairs far apart are
-        skipped in groups, as in find_collisions.
+        check_collisions; the pieces of a body must be at the identity pose. Groups of pairs that
+        are far apart are skipped together, as in find_collisions.
 
         HulldError: a placement has no answer, for example because its hull does not exist.
         """
@@ -623,8 +625,8 @@ class Client(ClientBase):
         freshness: Freshness | None = None,
         timeout: float | None = None,
     ) -> Scene:
-        """The pairs of a scene that collide, or are within a clearance or tolerance. Pairs far
-        apart are excluded in groups.
+        """The pairs of a scene that collide or are within a clearance or tolerance. Groups of pairs
+        that are far apart are skipped together.
 
         groups: the group of each placement; with ignore_same_group, pairs within a group are
         skipped, and so are pairs between two groups listed in ignored_group_pairs (k x 2). movers:

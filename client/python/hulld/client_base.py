@@ -33,7 +33,7 @@ class Assembly(Protocol[R]):
 
 
 class ClientBase:
-    """As Client, with the same arguments. Its methods are for subclasses that add calls."""
+    """Like Client, with the same arguments. Its methods are for subclasses that add calls."""
 
     def __init__(
         self,

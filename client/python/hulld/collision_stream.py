@@ -28,9 +28,9 @@ Update = tuple[npt.ArrayLike, PosesLike]
 
 
 class CollisionStream:
-    """One StreamCollisions call, step by step: the client sends poses, and receives the relations
-    of the affected pairs. The server keeps the witness of each pair and tries it first at the next
-    poses, so that small motions cost little.
+    """A StreamCollisions call, step by step: the client sends poses and receives the relations of
+    the affected pairs. The server caches the evidence that decided each pair and tries it first at
+    the next poses, so that small motions are cheap.
 
     Never retried, because the server's state ends with the stream. Not thread-safe. A context
     manager that ends the call. Created by Client.stream_collisions.
@@ -78,12 +78,12 @@ class CollisionStream:
         self, placements: npt.ArrayLike, poses: PosesLike, *, refresh_hulls: bool = False
     ) -> StreamAnswer:
         """Moves placements. Returns the answers for all pairs with a moved placement or, with
-        only_changes, for those pairs that changed their relation.
+        only_changes, for the pairs whose relation changed.
 
         placements: k distinct indices into the placements of the stream.
         poses: the new poses, k x 7, k x 4 x 4, or k x 3.
-        refresh_hulls: look up all hulls again first. If a hull changed, its placements count as
-        moved.
+        refresh_hulls: resolves all hulls again first. If a hull has changed, its placements count
+        as moved.
 
         ValueError: an index is out of range, a pose is malformed, or there are not k poses. Nothing
         was sent, and the stream remains usable. HulldError: the stream has ended; all later calls

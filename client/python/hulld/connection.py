@@ -27,9 +27,9 @@ PathLike = Union[str, "os.PathLike[str]"]
 class Tls:
     """Encrypts the connection. Files are PEM, read when the client is created.
 
-    ca_cert: the authorities that may sign the server's certificate; None: the system's. cert, key:
-    the client's certificate and its key, for mutual TLS. server_name: the name in the server's
-    certificate, if it differs from the address.
+    ca_cert: the authorities trusted to sign the server's certificate; None: the system's
+    authorities. cert, key: the client's certificate and its key, for mutual TLS. server_name: the
+    name in the server's certificate, if it differs from the address.
     """
 
     ca_cert: PathLike | None = None

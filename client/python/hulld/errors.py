@@ -47,7 +47,8 @@ class HulldError(Exception):
     code: gRPC's status, as in "NOT_FOUND". message: the problem and its remedy. reason: the name
     in proto/hulld/v1/error.proto, as in "HULL_NOT_FOUND"; None for errors of gRPC itself. metadata:
     details of the reason, as in {"hull_id": "arm"}. request_id: of the call in the server's log, or
-    None. retry_after: the seconds to wait before a retry, if the server allows one; else None.
+    None. retry_after: the seconds to wait before a retry, or None if the server does not suggest
+    one.
     """
 
     code = "UNKNOWN"
@@ -117,7 +118,7 @@ class NotFoundError(HulldError, LookupError):
 
 
 class AlreadyExistsError(HulldError):
-    """The hull exists already."""
+    """The hull already exists."""
 
     code = "ALREADY_EXISTS"
 

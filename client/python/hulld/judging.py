@@ -143,9 +143,9 @@ def judge(
     contact_time (0 to 1, for a motion), with NaN or an empty entry for a missing answer.
     Alternatively, the path of an .npz file with these arrays, or of a CSV file in the format of
     `hullctl judge`. hulls: points, n x 3, by name. max_error: a distance or depth is wrong if its
-    error certainly exceeds this, given the proven bound; 0: as exact as the bound. max_time_error:
-    how far a contact time may be outside the proven bracket. client: None: a private server, which
-    has no hulls. timeout: of each call.
+    error certainly exceeds this, given the proven bound; 0: only the bound is allowed.
+    max_time_error: how far a contact time may be outside the proven bracket. client: None: a
+    private server, which has no hulls. timeout: of each call.
 
     ValueError: the table is malformed. VerificationError: a certificate does not prove the server's
     answer.

@@ -50,8 +50,8 @@ _carriers: dict[str, str | None] = {}
 
 
 class Viewer:
-    """Asks `hullctl view --html` for a page. It uses the client's server, TLS settings, and token;
-    the token is passed in the environment, so that no process list shows it."""
+    """Generates pages with `hullctl view --html`. Uses the client's server, TLS settings, and
+    token, which is passed in the environment, so that no process list shows it."""
 
     def __init__(self, connection: Connection | None, missing: str = "") -> None:
         self._connection = connection

@@ -15,7 +15,7 @@ namespace {
 constexpr size_t kMaxTrianglesToTest = 64;
 // A block of at most this many points is not sampled: all are tested against all triangles.
 constexpr size_t kSmallBlock = 4096;
-// Each sample, and finally the block, is this many times the previous sample.
+// Each sample, and finally the block, is this many times as large as the previous sample.
 constexpr size_t kSampleRatio = 16;
 // Samples consist of runs of consecutive points, for memory locality.
 constexpr size_t kRun = 8;
@@ -27,8 +27,9 @@ constexpr double kBlockWalksPerPoint = 0.2;
 constexpr size_t kManyPerTriangle = 32;
 constexpr double kFineMapFineness = 8;
 constexpr double kWalksPerSurvivor = 0.6;
-// Points to locate per triangle from which on the cones of triangles are worth their computation.
-// Observed: 12 cost 3 % of the time of a block, 20 save 4 %.
+// The number of points to locate per triangle at which computing the cones of the triangles pays
+// off. Observed: with 12 points per triangle, cones cost 3 % of the time of a block; with 20, they
+// save 4 %.
 constexpr size_t kWorthCones = 16;
 
 // Share of duplicates in a sample above which the rest of the block is inserted in rounds, whose
@@ -51,7 +52,7 @@ class BlockInsertion {
         poll_(poll) {}
 
   bool Run() {
-    // Measuring a triangle and allocating its list cost about as much as a point inserted in
+    // Measuring a triangle and allocating its list cost about as much as inserting a point in
     // rounds.
     if (!surface_.IsMeasurable() || points_.size() < surface_.triangle_count()) {
       return InsertRounds();

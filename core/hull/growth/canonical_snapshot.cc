@@ -36,7 +36,7 @@ void Sort(const VertexTable& vertices, std::span<Ranked> ranked) {
 // composition of rounded monotonic operations, so slices are in order for any rounding.
 std::vector<Ranked> SortedByPoint(const VertexTable& table, std::vector<Ranked> vertices,
                                   StopPoll& poll) {
-  // A range with a length that overflows or is zero is not sliced.
+  // The range is not sliced if its length overflows or is zero.
   double least = INFINITY;
   double largest = -INFINITY;
   for (const Ranked& v : vertices) {
@@ -152,7 +152,7 @@ class FaceCollector {
     uint32_t first = 0;
     for (uint32_t tail = 0; tail < vertex_count; ++tail) {
       if (poll.Step()) return std::nullopt;
-      // After the departures were written, this is their end.
+      // After WriteDepartures, this is the end of the departures.
       const uint32_t end = departures_at_[tail];
       SortByHead(std::span(departures_).subspan(first, end - first));
       for (; first < end; ++first) {
@@ -198,16 +198,17 @@ class FaceCollector {
         .subspan(polygon_starts_[k], polygon_starts_[k + 1] - polygon_starts_[k]);
   }
 
-  // Edges at which triangles were joined record if they are flat. Triangles created together share
-  // an apex; for each, tests the edge to the next one around the apex.
+  // Edges at which a triangle was joined to an older one already record if they are flat. Triangles
+  // created together share an apex; for each of these, tests the edge to the next triangle around
+  // the apex.
   void FindFlatEdges(StopPoll& poll) {
     const auto neighbor = [this](size_t id) -> const SurfaceTriangle& {
       return surface_.triangle(surface_.triangle(static_cast<TriangleId>(id)).neighbors[1]);
     };
     surface_.ForEachTriangle([&](TriangleId id, const SurfaceTriangle& t) {
       if (poll.Step()) return;
-      // Neighbors and their vertices are anywhere in memory, so both are requested ahead of their
-      // use. Not in a function: compilers drop calls without effect.
+      // Neighbors and their vertices are scattered in memory, so both are prefetched. Not a
+      // function, because compilers drop calls without effect.
       if (const size_t ahead = id + kAhead; ahead < surface_.id_bound()) {
         __builtin_prefetch(&neighbor(ahead));
         __builtin_prefetch(&vertices_[neighbor(ahead - kAhead / 2).corners[1]]);
@@ -265,9 +266,9 @@ class FaceCollector {
     polygon_starts_.push_back(static_cast<uint32_t>(polygon_vertices_.size()));
   }
 
-  // Calls visit(tail, head, next) for every edge of a triangular facet, and of a polygon, that
-  // leads from a lower vertex to a higher one. For the other edges of a triangle, the tail is the
-  // number of vertices: a branch would be unpredictable.
+  // Calls visit(tail, head, next) for every edge of a triangular facet or a polygon that leads from
+  // a lower vertex to a higher one. The other edges of a triangle are visited with the number of
+  // vertices as their tail, because a branch would be unpredictable.
   template <typename Visitor>
   void ForEachTriangleDeparture(const SurfaceTriangle& t, Visitor&& visit) const {
     const auto [a, b, c] = RanksOf(t);
@@ -295,7 +296,7 @@ class FaceCollector {
     });
     for (size_t k = 0; k + 1 < polygon_starts_.size(); ++k) ForEachPolygonDeparture(k, count);
     uint32_t begin = 0;
-    // The last entry counts the edges that are no departures; these share one place.
+    // The last entry counts the edges that are not departures, which share one place.
     departures_at_.back() = 0;
     for (uint32_t& at : departures_at_) begin += std::exchange(at, begin);
     departures_.resize(begin + 1);

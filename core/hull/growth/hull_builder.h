@@ -18,11 +18,11 @@ namespace hulld {
 // Classification of a block's points. received = outside + duplicate + inside.
 struct PointCounts {
   uint64_t received = 0;
-  // Points that became vertices and still are after the block.
+  // Points that became vertices and are still vertices after the block.
   uint64_t outside = 0;
-  // Points equal to a vertex that another point accounts for, at the end of the block.
+  // Points equal to a vertex that is already counted for another point, after the block.
   uint64_t duplicate = 0;
-  // Points in the hull after the block that are not vertices of it.
+  // All other points: in the hull after the block, but not vertices.
   uint64_t inside = 0;
 
   PointCounts& operator+=(const PointCounts& other) {
@@ -60,7 +60,7 @@ class HullBuilder {
   HullBuilder& operator=(HullBuilder&&) noexcept;
   ~HullBuilder();
 
-  // Adds a block: all of it, or nothing if the result is an error. points: n x 3, the caller's
+  // Adds a block of points, or changes nothing if it returns an error. points: n x 3, the caller's
   // length unit. -0 is stored as +0. If the limits may end the call, a journal records the previous
   // state of each changed triangle and vertex, so that the call can be undone. Errors:
   // INVALID_ARGUMENT "points[17].y is NaN" (or "is infinite"); RESOURCE_EXHAUSTED if the hull would
@@ -73,13 +73,13 @@ class HullBuilder {
   // Returns the vertices, in no particular order. Adding them to an empty builder yields the same
   // hull. Cost: O(V).
   std::vector<Vector> Vertices() const;
-  // Returns the vertices created by the last successful Add; their number is its counts' `outside`.
+  // Returns the vertices created by the last successful Add, as many as it counted as `outside`.
   // Adding them to the builder's previous state yields the same hull. Cost: O(points of that
   // block).
   std::vector<Vector> NewVertices() const;
 
-  // Memory, by capacities, in bytes. Below 230 bytes per vertex from 1000 vertices on; inside
-  // points are not kept. Cost: O(1) from dimension 3 on.
+  // Memory in bytes, including spare capacity: below 230 bytes per vertex for 1000 vertices or
+  // more, because inside points are not kept. Cost: O(1) in dimension 3.
   size_t MemoryBytes() const;
   // Size of the journal at the end of the last Add, in bytes, beyond MemoryBytes(). At most
   // proportional to the changes of that call, regardless of the size of the hull; 0 if the limits

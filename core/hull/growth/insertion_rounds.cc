@@ -47,7 +47,7 @@ constexpr int kGridBits = 14;
 constexpr int kPlaceBits = 3 + 2 * kGridBits;
 static_assert(kPlaceBits <= 32);
 
-// Leaves the result unsorted if the poll stops.
+// The result is unsorted if the poll stops.
 void SortByUpperHalf(std::vector<SortKey>& keys, std::vector<SortKey>& scratch, StopPoll& poll) {
   constexpr size_t kWorthRadix = 2048;
   if (keys.size() < kWorthRadix) {

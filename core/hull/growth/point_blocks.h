@@ -9,7 +9,7 @@
 
 namespace hulld {
 
-// Points in fours, structure of arrays, for testing four at once against planes.
+// Four points as a structure of arrays, to be tested against planes together.
 struct PointBlock {
   static constexpr size_t kSize = 4;
 
@@ -53,9 +53,10 @@ inline bool IsCertainlyBelow(const PlaneWithBound& plane, const Vector& p) {
 inline constexpr int64_t kBelowAll = -1;
 inline constexpr int64_t kUncertain = -2;
 
-// Finds, for each point of the blocks, the index of a plane that it is certainly above, the one
-// with the largest normal . p - offset; kBelowAll or kUncertain if there is none. matches: 4 per
-// block. Returns true if some are uncertain. Bit-identical with and without AVX2.
+// Finds, for each point of the blocks, the plane with the largest normal . p - offset among the
+// planes that the point is certainly above; kBelowAll or kUncertain if there is none. matches:
+// indices of planes, 4 per block. Returns true if some points are uncertain. Bit-identical with and
+// without AVX2.
 bool MatchPlanes(std::span<const PointBlock* const> blocks, std::span<const PlaneWithBound> planes,
                  int64_t* matches);
 

@@ -33,7 +33,7 @@ class PolygonBoundary {
   }
 
   // Journal of changes: StartJournal starts it, Undo restores the state at its start, EndJournal
-  // keeps the changes. The table undoes its vertices itself. Cost: the changes.
+  // keeps the changes. The vertex table has its own journal. Cost: O(changes).
   void StartJournal() { has_journal_ = true; }
   void Undo();
   void EndJournal() {

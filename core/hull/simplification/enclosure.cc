@@ -143,7 +143,7 @@ std::optional<SimplifiedHull> Enclosure::HullAround(std::span<const Corner> corn
   if (!HoldsAll(builder)) return std::nullopt;
   absl::StatusOr<Hull> hull = builder.Snapshot(should_stop_);
   if (!hull.ok()) return std::nullopt;
-  // The distance from a convex set is largest at a vertex, and every vertex is one of these.
+  // The distance from a convex set is largest at a vertex, and every vertex is a corner.
   double error = 0;
   for (const Corner& corner : corners) {
     if (poll_.Step()) return std::nullopt;

@@ -23,12 +23,12 @@ class InsideOrder {
   InsideOrder(const InsideOrder&) = delete;
   InsideOrder& operator=(const InsideOrder&) = delete;
 
-  // The number of vertices that this order starts with, the fewest that it supports.
+  // The number of vertices that this order starts with, which is the fewest that it supports.
   size_t least() const { return least_; }
-  // Returns the number of leading vertices that reduces the error to `error`, or `most` if that is
-  // not reached earlier. At least least(). Requires: most >= least().
+  // Returns the number of leading vertices that reduce the error to `error`, or `most` if more
+  // would be needed. At least least(). Requires: most >= least().
   size_t CountFor(double error, size_t most);
-  // Returns a **proven** bound, in the caller's length unit, of the distance of any point of the
+  // Returns a **proven** bound, in the caller's length unit, on the distance of any point of the
   // hull from the hull of the first `count` vertices. Requires: least() <= count <= the hull's
   // vertices.
   double ErrorAt(size_t count);

@@ -30,8 +30,8 @@ class PolygonSubset {
   // Chooses the apparently farthest vertex. Requires: !is_complete(). Cost: O(vertices of the arc
   // that it splits).
   void ChooseNext(StopPoll& poll);
-  // Returns a **proven** bound, in units, of the distance of any vertex from the polygon of the
-  // chosen ones. Cost: O(1).
+  // Returns a **proven** bound, in units, on the distance of any vertex from the polygon of the
+  // chosen vertices. Cost: O(1).
   double DistanceBound() const { return arcs_.top().distance; }
 
  private:

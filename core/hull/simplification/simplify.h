@@ -10,15 +10,16 @@
 
 namespace hulld {
 
-// The extent of a simplification. Requires: at least one limit.
+// Limits of a simplification. Requires: at least one limit.
 //
 // max_vertices is never exceeded. max_error alone is always met, if necessary by the hull itself,
 // with error 0. With both, max_error is met if the method finds a hull within both limits;
 // otherwise the result is the best found within max_vertices, so check the achieved error.
 struct SimplifyTarget {
-  // 0: no limit.
+  // 0 means no limit.
   size_t max_vertices = 0;
-  // The caller's length unit, finite. 0: no limit, so the least error that max_vertices permits.
+  // In the caller's length unit, finite. 0 means no limit: the error is as small as max_vertices
+  // permits.
   double max_error = 0;
   // Polled often; true ends the simplification with CANCELLED. May be empty.
   std::function<bool()> should_stop;
@@ -27,16 +28,17 @@ struct SimplifyTarget {
 // A hull that approximates another one, and its error.
 struct SimplifiedHull {
   Hull hull;
-  // A **proven** bound, for all finite doubles, of the Hausdorff distance between this hull and the
-  // one that it approximates. Infinite only if the distance may exceed the largest double.
+  // A **proven** bound, for all finite doubles, on the Hausdorff distance between this hull and the
+  // hull that it approximates. Infinite only if the distance may exceed the largest double.
   double error = 0;
 };
 
 // Returns a hull inside the given one. Its vertices are a subset of the given hull's, chosen
 // farthest first and then, for a solid, spread more evenly if that improves the result.
 //
-// With max_vertices alone: that many vertices, or all if there are fewer. With max_error: few
-// vertices for an error of at most max_error, or as many as max_vertices permits. Errors:
+// With max_vertices alone, the result has that many vertices, or all if there are fewer. With
+// max_error, it has few vertices for an error of at most max_error, or as many as max_vertices
+// permits. Errors:
 // INVALID_ARGUMENT: no limit, a max_error that is negative, infinite or NaN, or fewer vertices than
 // needed to preserve the dimension (dimension + 1). CANCELLED: should_stop returned true.
 //

@@ -15,7 +15,7 @@ namespace hulld {
 // Distinct vertices of a hull, by index, and the quality of their hull as an approximation.
 struct VertexChoice {
   std::vector<uint32_t> vertices;
-  // A **proven** bound, in the caller's length unit, of the distance of any point of the hull from
+  // A **proven** bound, in the caller's length unit, on the distance of any point of the hull from
   // the hull of these vertices.
   double error = 0;
 };
@@ -25,12 +25,11 @@ struct VertexChoice {
 std::optional<Hull> HullOfSubset(const Hull& full, std::span<const uint32_t> chosen,
                                  StopPoll& poll);
 
-// Returns the indices of the inside hull's vertices among those of the full hull, which include
-// them all.
+// Returns the indices of the inside hull's vertices in the full hull, which contains all of them.
 std::vector<uint32_t> PlacesOf(const Hull& inside, const Hull& full);
 
-// Returns twice the area of a facet times its unit normal, rounded. Newell's sum, which is robust
-// for many corners.
+// Returns twice the area of a facet times its unit normal, rounded. Computed by Newell's method,
+// which is robust for many corners.
 Vector AreaNormal(std::span<const Vector> points, std::span<const uint32_t> loop);
 
 }  // namespace hulld

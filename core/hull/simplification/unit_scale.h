@@ -11,7 +11,7 @@
 namespace hulld {
 
 // Converts lengths and points to units of a power of two above the largest coordinate, so that no
-// difference and no product of two of them overflows, and no significant one underflows.
+// difference or product of two of them overflows, and no significant product underflows.
 class UnitScale {
  public:
   // Requires: a finite length >= 0. Coordinates of at most that map to at most 1.

@@ -160,8 +160,8 @@ double VertexSubset::DistanceTo(TriangleId id, uint32_t point) const {
                                  unit_points_[chosen_[c]], unit_points_[point]);
 }
 
-// Assigns the vertex to a triangle that it sees strictly, the one that it is highest above, up to
-// rounding. Requires: it sees a target; ConflictLists explains the reason.
+// Assigns the vertex to the triangle that it is highest above, up to rounding, among the targets
+// that it sees strictly. Requires: it sees a target, for the reason given at ConflictLists.
 void VertexSubset::Assign(uint32_t point, std::span<const TriangleId> targets) {
   TriangleId best = targets[0];
   double most = HeightOver(best, point);

@@ -27,12 +27,13 @@ namespace hulld {
 // and its quality.
 class VertexSubset {
  public:
-  // points: all vertices of a hull of dimension 3; unit_points: the same at unit scale. Both must
-  // outlive this object. Starts with four vertices. If the poll stopped, here or in ChooseNext,
-  // this object may only be destroyed. Cost: O(points).
+  // points: all vertices of a hull of dimension 3; unit_points: the same vertices at unit scale.
+  // Both must outlive this object. Starts with four vertices. If the poll stopped, here or in
+  // ChooseNext, this object may only be destroyed. Cost: O(points).
   VertexSubset(std::span<const Vector> points, std::span<const Vector> unit_points, StopPoll& poll);
   // Starts with the given vertices, without duplicates. Returns nothing if they lie in a plane or
-  // the poll stopped. Cost: as that many choices, for an order that is roughly farthest first.
+  // the poll stopped. Cost: that of as many calls of ChooseNext, if the order is roughly farthest
+  // first.
   static std::optional<VertexSubset> StartingWith(std::span<const uint32_t> start,
                                                   std::span<const Vector> points,
                                                   std::span<const Vector> unit_points,
@@ -44,8 +45,8 @@ class VertexSubset {
   // Chooses the apparently farthest vertex. Requires: !is_complete(). Cost: O((V + n) log n) for n
   // choices of V vertices of round shapes.
   void ChooseNext(StopPoll& poll);
-  // Returns a **proven** bound, in units, of the distance of any vertex from the hull of the chosen
-  // ones. Cost: O(log V) amortized.
+  // Returns a **proven** bound, in units, on the distance of any vertex from the hull of the chosen
+  // vertices. Cost: O(log V) amortized.
   double DistanceBound();
 
  private:

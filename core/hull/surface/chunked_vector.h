@@ -82,7 +82,7 @@ class ChunkedVector {
     HULLD_CHECK(journal_.empty() && journal_end_ == 0);
     journal_end_ = size_;
   }
-  // Restores the state at the start of the journal, and ends it. Cost: the changes.
+  // Restores the state at the start of the journal, and ends it. Cost: O(changes).
   void Undo() {
     for (const Change& change : journal_) {
       chunks_[change.index >> kBits][change.index & kMask] = change.before;
@@ -93,7 +93,7 @@ class ChunkedVector {
     if (noted_.size() > chunks_.size()) noted_.resize(chunks_.size());
     if (chunks_.empty()) first_capacity_ = 0;
   }
-  // Ends the journal and keeps the changes. Cost: the changes.
+  // Ends the journal and keeps the changes. Cost: O(changes).
   void EndJournal() {
     for (const Change& change : journal_) {
       noted_[change.index >> kBits][(change.index & kMask) / 64] = 0;

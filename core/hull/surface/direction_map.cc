@@ -21,7 +21,7 @@ namespace {
 
 // The least pivot of the moments, relative to their sum along the axes: flatter sets have no frame.
 constexpr double kMinRelativeMoment = 0x1p-40;
-// The condition number of L above which it is worth its multiplications.
+// The condition number of L above which multiplying by L pays off.
 constexpr double kWorthAFrame = 4;
 
 double RowSumNorm(const Eigen::Matrix3d& m) { return m.cwiseAbs().rowwise().sum().maxCoeff(); }
@@ -139,7 +139,7 @@ bool DirectionMap::Coarsen() {
 
 void DirectionMap::AppendSurvivors(std::span<const Vector> points, std::vector<uint32_t>& survivors,
                                    StopPoll& poll) const {
-  // Processes one chunk after the other, so that the buffer stays in the nearest cache.
+  // Processes the points in chunks, so that the buffer stays in the L1 cache.
   constexpr size_t kChunk = 1024;
   // Extra capacity, because four indices are written together.
   std::array<uint32_t, kChunk + 4> buffer;
@@ -274,7 +274,7 @@ struct FourPlaces {
     const __m256d column = _mm256_floor_pd(_mm256_min_pd(second, grid.last));
     along_first = _mm256_sub_pd(first, row);
     along_second = _mm256_sub_pd(second, column);
-    // A distance out of range, or zero, reads the first gauges and keeps its point.
+    // A point whose distance is zero or out of range reads the first gauges and is kept.
     in_range = _mm256_and_pd(_mm256_cmp_pd(distance, _mm256_set1_pd(kMapMinDistance), _CMP_GE_OQ),
                              _mm256_cmp_pd(distance, _mm256_set1_pd(kMapMaxDistance), _CMP_LE_OQ));
     const __m256d in_row = _mm256_add_pd(_mm256_mul_pd(on_cube.face, grid.corners), row);

@@ -51,9 +51,9 @@ class MapFrame {
 };
 
 // A cube map of directions around a point c strictly inside a growing convex set: 6 faces of n x n
-// cells. Each corner of a cell stores a bound of the set's gauge in its direction, and each cell a
-// hint of the place on the surface that its directions lead to. The set only grows, so the map
-// stays valid.
+// cells. Each corner of a cell stores a bound on the set's gauge in its direction, and each cell
+// stores a hint of the place on the surface to which its directions lead. The set only grows, so
+// the map stays valid.
 //
 // The gauge of a convex set, the factor by which the set about c must be scaled to reach a point,
 // is convex along any line. A point's direction, scaled to the largest absolute component 1, lies

@@ -94,9 +94,9 @@ class Surface {
     TriangleId triangle;
   };
   // Locates a point; fast if the last point located with these cones, or in the same cell of the
-  // map, was near it. Unknown if the walk exceeds the length expected for the surface. cones: of
-  // the present surface; may be null, and then no location is kBelow. Requires: a known interior
-  // point.
+  // map, was near it. Unknown if the walk exceeds the length expected for the surface. cones: the
+  // cones of the present surface, or null; without cones, no location is kBelow. Requires: a known
+  // interior point.
   Location Locate(const VertexTable& vertices, const Vector& point, TriangleCones* cones) {
     HULLD_CHECK(directions_.has_value());
     if (cones != nullptr) return LocateByCones(vertices, point, *cones);
@@ -146,7 +146,7 @@ class Surface {
 
   // Journal of changes: StartJournal starts it, Undo restores the state at its start except hints
   // for walks, EndJournal keeps the changes. Requires: no journal for StartJournal, a journal for
-  // the other two. Cost: the changes.
+  // the other two. Cost: O(changes).
   void StartJournal();
   void Undo();
   void EndJournal();
@@ -197,7 +197,7 @@ class Surface {
     HULLD_DCHECK(id < id_bound());
     return triangles_[id].corners[0] != kDead;
   }
-  // IDs of triangles lie below this.
+  // All triangle IDs are below this.
   size_t id_bound() const { return triangles_.size(); }
   // Returns the factor of a plane's slope in its error bound; infinite if the bound would not hold.
   double SizeWith(const VertexTable& vertices, const Vector& point) const {

@@ -62,14 +62,14 @@ const char* FindLinkDefect(const Surface& surface, const VertexTable& vertices, 
     if (next >= surface.id_bound() || !surface.IsAlive(next)) return "a neighbor is not alive";
     const SurfaceTriangle& other = surface.triangle(next);
     const size_t j = TwinOf(t, i, other);
-    if (j == 3) return "a neighbor does not run along the common edge the other way";
+    if (j == 3) return "a neighbor does not traverse the common edge in the opposite direction";
     if (other.neighbors[j] != id) return "a neighbor does not link back";
     if (const char* defect = FindCornerDefect(vertices, other)) return defect;
     const int bend = BendAt(vertices, t, other, j);
     if (bend > 0) return "the surface is not convex at an edge";
     const bool is_flat = (t.flat >> i & 1) != 0;
-    if (is_flat != ((other.flat >> j & 1) != 0)) return "one side alone of an edge is flat";
-    if (is_flat && bend != 0) return "an edge that is flat bends";
+    if (is_flat != ((other.flat >> j & 1) != 0)) return "an edge is marked flat on one side only";
+    if (is_flat && bend != 0) return "an edge marked flat is not flat";
   }
   return nullptr;
 }
@@ -111,7 +111,7 @@ const char* FindStarDefect(const Surface& surface, const VertexTable& vertices,
     if (t.corners[2] != apex) return "a new triangle does not end at the new vertex";
     const SurfaceTriangle& beyond = surface.triangle(t.neighbors[0]);
     const bool is_flat = BendAt(vertices, t, beyond, TwinOf(t, 0, beyond)) == 0;
-    if (is_flat != ((t.flat & 1) != 0)) return "the horizon does not bend where it should";
+    if (is_flat != ((t.flat & 1) != 0)) return "an edge of the horizon has the wrong flat mark";
   }
   return nullptr;
 }

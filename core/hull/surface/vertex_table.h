@@ -35,7 +35,7 @@ class VertexTable {
     added_before_ = std::move(added_);
     count_before_ = count_;
   }
-  // Restores the state at the start of the journal, and ends it. Cost: the changes.
+  // Restores the state at the start of the journal, and ends it. Cost: O(changes).
   void Undo() {
     points_.Undo();
     counts_.Undo();
@@ -44,7 +44,7 @@ class VertexTable {
     added_before_ = {};
     count_ = count_before_;
   }
-  // Ends the journal and keeps the changes. Cost: the changes.
+  // Ends the journal and keeps the changes. Cost: O(changes).
   void EndJournal() {
     points_.EndJournal();
     counts_.EndJournal();
@@ -115,7 +115,7 @@ class VertexTable {
   }
 
   const Vector& operator[](VertexId id) const { return points_[id]; }
-  // False for a free ID, and for one that was never assigned.
+  // False for an ID that is free or was never assigned.
   bool IsAlive(VertexId id) const { return id < points_.size() && counts_[id].is_alive; }
   // Returns the live vertices that the current block added. Cost: O(points of the block that were
   // vertices at any time).
@@ -138,7 +138,7 @@ class VertexTable {
   }
   // Number of live vertices.
   size_t size() const { return points_.size() - free_.size(); }
-  // IDs lie below this.
+  // All IDs are below this.
   size_t id_bound() const { return points_.size(); }
   size_t MemoryBytes() const {
     return points_.MemoryBytes() + counts_.MemoryBytes() + free_.MemoryBytes() +

@@ -75,7 +75,7 @@ bool IsInOrder(const PlacedBody& a, const PlacedBody& b) {
   return true;
 }
 
-// Options for the deciding pair, without certificates: these are found separately.
+// Options for the deciding pair, without certificates, which are found separately.
 QueryOptions OfDecidingPair(const QueryOptions& options) {
   QueryOptions deciding = options;
   deciding.want_certificate = false;

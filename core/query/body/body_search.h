@@ -20,7 +20,7 @@
 
 namespace hulld {
 
-// The details that an answer about bodies has beyond an answer about hulls.
+// The part of an answer that only bodies have.
 struct PiecesAnswer {
   // The deciding pair. None if only the relation was requested and no pair collides or is within
   // the clearance, or if either body is empty.
@@ -142,7 +142,7 @@ class BodySearch {
   Rung rung_ = Rung::kBounds;
   bool within_clearance_ = false;
   std::optional<PiecePair> decided_;
-  // The least separation found, and bounds of the least over all pairs found.
+  // The least separation found, and bounds on the least separation of all pairs found.
   double min_value_ = std::numeric_limits<double>::infinity();
   double min_low_ = std::numeric_limits<double>::infinity();
   double min_high_ = std::numeric_limits<double>::infinity();

@@ -16,7 +16,7 @@
 
 namespace hulld {
 
-// The proof of the relation of a piece of A and a piece of B, as of two hulls at their poses.
+// The proof of the relation of a piece of A and a piece of B, as for two hulls at their poses.
 struct PieceCertificate {
   PiecePair pieces;
   Relation relation;

@@ -66,8 +66,8 @@ struct PiecePair {
 };
 
 // Returns a box (world frame) that certainly contains all pieces; larger than the smallest such box
-// if the body is rotated. Covers all of space beyond the range of doubles; empty if all pieces
-// are.
+// if the body is rotated. Covers all of space if coordinates are beyond the range of doubles. Empty
+// if all pieces are empty.
 Box BoundingBox(const PlacedBody& placed);
 
 }  // namespace hulld

@@ -32,7 +32,8 @@ class PieceBoxes {
 
   // Indexed by piece; boxes of empty hulls are empty.
   const BoxTree& tree() const { return tree_; }
-  // Contains all pieces; covers all of space beyond the range of doubles, empty if all pieces are.
+  // Contains all pieces. Covers all of space if coordinates are beyond the range of doubles. Empty
+  // if all pieces are empty.
   Box all() const { return tree_.empty() ? Box::Empty() : tree_.box(0); }
   // Largest absolute coordinate; infinite if a box covers all of space.
   double size() const { return size_; }

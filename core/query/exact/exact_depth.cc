@@ -22,8 +22,8 @@
 namespace hulld {
 namespace {
 
-// Maximum number of seed vertices inserted, each in O(facets): the last ones, which are nearest. A
-// choice.
+// Maximum number of seed vertices to insert, each in O(facets). The last ones are inserted, because
+// they are nearest. A choice.
 constexpr size_t kMaxSeeds = 1024;
 
 // The plane n.w = offset of a facet, n outward. `key` is its signed distance from the origin in

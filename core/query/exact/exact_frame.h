@@ -16,8 +16,8 @@ struct SmallRotation {
   Int128 norm;
 };
 
-// The composition and size of the world coordinates of a pair of hulls in integers of few bits. In
-// units of 2^exponent / norm, shifted by -t_A, world coordinates are
+// The scale and size of the world coordinates of a pair of hulls in integers of few bits. In units
+// of 2^exponent / norm, shifted by -t_A, world coordinates are
 //   A: factor * rows_A * 2^(exponent_A - exponent) * own, and
 //   B: factor * rows_B * 2^(exponent_B - exponent) * own + norm * (t_B - t_A) / 2^exponent,
 // where own are a hull's coordinates over 2^exponent_A or 2^exponent_B, and the factor is the other
@@ -47,12 +47,12 @@ inline constexpr int WordsFor(int bits) { return (bits + 9 + 63) / 64; }
 // Requires: q finite and not zero.
 bool FindSmallRotation(const std::array<double, 4>& q, SmallRotation& rotation);
 
-// Finds the rotation of a placed hull. The rotation of a piece of a body is a product of two, which
-// is small if its norm is below 2^120, for example if one factor is the identity or a rotation by
-// quarter turns.
+// Finds the rotation of a placed hull. The rotation of a piece of a body is a product of two
+// rotations. It is small if its norm is below 2^120, for example if one factor is the identity or a
+// rotation by quarter turns.
 bool FindSmallRotation(const PlacedHull& placed, SmallRotation& rotation);
 
-// Returns the poses that place a hull: its own, or both of a piece of a body.
+// Returns the poses that place a hull: its own pose, or both poses of a piece of a body.
 std::array<const Pose*, 2> PosesOf(const PlacedHull& placed);
 // Returns the least exponent of the lowest bits of the hull's translations, or `otherwise` if that
 // is less.

@@ -20,7 +20,7 @@ namespace hulld {
 
 using ExactCorner = MinkowskiVertex<IntegerVector>;
 
-// An exact pair of posed hulls, in integers.
+// A pair of placed hulls in integers, exactly.
 //
 // With Q the quaternions' integers and N = |Q|^2, the world coordinates, shifted by -t_A and
 // multiplied by N_A N_B and a power of two, are integers: N_B R(Q_A) P_A for A, and N_A R(Q_B) P_B
@@ -31,10 +31,10 @@ using ExactCorner = MinkowskiVertex<IntegerVector>;
 // are multiplied out, in integers of a fixed width if the pair's numbers fit.
 class ExactPair {
  public:
-  // Builds the pair for the hulls and poses of `filter`, which must outlive it, as must
-  // should_stop, which may be empty. Scans of many vertices poll should_stop; after stopped(),
-  // their results are meaningless. with_narrow: finds the farthest vertices in integers of a fixed
-  // width if the pair's numbers fit; the result is the same.
+  // Builds the pair for the hulls and poses of `filter`. `filter` and should_stop, which may be
+  // empty, must outlive the pair. Scans of many vertices poll should_stop; after stopped(), their
+  // results are meaningless. with_narrow: finds the farthest vertices in integers of a fixed width
+  // if the pair's numbers fit; the result is the same.
   ExactPair(const FloatPair& filter, const std::function<bool()>& should_stop,
             bool with_narrow = true);
   ~ExactPair();

@@ -66,7 +66,7 @@ ExactSpan<Pair> FindSpan(Pair& pair) {
   return span;
 }
 
-// A search of a pair.
+// The search for one pair.
 template <typename Pair>
 class Search {
  public:

@@ -251,7 +251,8 @@ int PortalSearch<Pair>::SignOfAdvance(Direction& n, const Point& p, const Point&
   return Sign(Dot(n.exact(), Coordinates(Exact(w) - Exact(p))));
 }
 
-// Floating point leaves few candidates, usually one; exact values decide among several.
+// Floating point leaves few candidates, usually a single one. If there are several, exact values
+// decide.
 template <typename Pair>
 typename PortalSearch<Pair>::Point PortalSearch<Pair>::Farthest(Direction& n) {
   ++directions_tried_;

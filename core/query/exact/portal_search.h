@@ -58,9 +58,9 @@ class PortalSearch {
   };
   Result Run();
 
-  // Decides from the final state of a floating-point search by making its signs exact; returns
-  // nothing if that is not sufficient. Costs a fraction of Run, and works for a C of any dimension
-  // that is not thickened.
+  // Tries to decide from the final state of a floating-point search by making its signs exact;
+  // returns nothing if this does not suffice. Costs a fraction of Run, and works for a C of any
+  // dimension that is not thickened.
   //
   // A direction along which nothing reaches the origin separates, regardless of its source. A
   // tetrahedron of vertices of C with the origin strictly inside proves an overlap. A corner equal
@@ -81,7 +81,7 @@ class PortalSearch {
     // Computed on demand.
     mutable std::optional<Coordinates> exact;
   };
-  // The construction of a direction.
+  // The way in which a direction is constructed.
   enum class Kind {
     kRay,            // the ray's
     kAcrossPoint,    // ray x p

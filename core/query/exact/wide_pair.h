@@ -80,8 +80,8 @@ class WidePair {
   Coordinates VertexB(uint32_t i) { return b_.Vertex(i); }
   Coordinates Difference(VertexPair pair) { return VertexA(pair.a) - VertexB(pair.b); }
 
-  // Return the lowest of the vertices of A farthest along n, and of B farthest against it: among
-  // all, or among `candidates`, ascending, if the result is known to be one of these.
+  // Return the lowest of the vertices of A that are farthest along n, and of the vertices of B that
+  // are farthest against n. `candidates`: ascending vertices that are known to include the result.
   uint32_t FarthestA(const Direction& n) {
     CandidateBuffer buffer;
     return a_.Farthest(n,

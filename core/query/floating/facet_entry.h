@@ -16,10 +16,10 @@ struct BetweenTimes {
   double after;
 };
 
-// Returns the doubles around the time at which the path enters the solid C through the inside of
-// the triangle of three of its vertices, if floating point and double-double arithmetic prove all
-// of this: C is solid, the triangle lies in a supporting plane, the line crosses its inside, and
-// the time is not a double. Nothing otherwise. Cost: about a microsecond.
+// Returns the doubles around the time at which the path enters the solid C through the inside of a
+// triangle of three of its vertices. Returns nothing unless floating point and double-double
+// arithmetic prove that C is solid, the triangle lies in a supporting plane, the line crosses its
+// inside, and the time is not a double. Cost: about a microsecond.
 std::optional<BetweenTimes> FindEntry(const FloatPair& start, const RelativePath& path,
                                       const Motion& X_WA, const Motion& X_WB,
                                       const std::array<VertexPair, 3>& facet);

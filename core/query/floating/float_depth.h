@@ -23,10 +23,10 @@ namespace hulld {
 // least r. The orientations are exact for the computed vertices; vertex errors below r preserve the
 // winding number.
 //
-// `start`: four pairs with differences that are the corners of a tetrahedron, usually around the
-// origin; or none. The bounds may miss the goal; `vertices` then receives the pairs of all vertices
-// of the polytope. If the poll stopped, the result is meaningless. Requires: pair.usable(), and the
-// relation OVERLAPPING (unchecked: otherwise the lower bound is 0).
+// `start`: four pairs whose differences are the corners of a tetrahedron, usually around the
+// origin; may be empty. The bounds may miss the goal; `vertices` then receives the pairs of all
+// vertices of the polytope. If the poll stopped, the result is meaningless. Requires:
+// pair.usable(), and the relation OVERLAPPING (unchecked: otherwise the lower bound is 0).
 SeparationBounds BoundDepth(const FloatPair& pair, std::span<const VertexPair> start,
                             const SeparationGoal& goal, bool want_point, StopPoll& poll,
                             std::vector<VertexPair>& vertices);

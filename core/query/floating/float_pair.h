@@ -67,7 +67,7 @@ class FloatPair {
     // n . (a - b): within SupportError of the maximum over A - B.
     double value;
   };
-  // Returns the vertex of A farthest along n_W, and that of B farthest against it.
+  // Returns the vertex of A farthest along n_W, and the vertex of B farthest against it.
   Support Farthest(const PlainVector& n_W) const;
   // Returns the error bound of that value relative to the true maximum. Requires: the largest
   // component of n_W between kDirectionMin and kDirectionMax.

@@ -113,7 +113,7 @@ class FloatSearch {
       }
     }
     if (result_.verdict == FloatVerdict::kSeparated) {
-      // Separated, only a flat tetrahedron seems to hold the origin.
+      // If the hulls are separated, only a flat tetrahedron seems to contain the origin.
       if (!outside) n = LaneVector(TowardFromNearestFace());
       return progress;
     }

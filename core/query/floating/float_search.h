@@ -30,8 +30,9 @@ inline constexpr double kEndsAtSign = -1;
 
 // Walks toward the point of A - B that is nearest to the origin (Gilbert, Johnson and Keerthi
 // 1988), until the sign of the separation shows. If it is positive and `max_error` is not
-// kEndsAtSign, the walk goes on, as a start for distances, until half the width of its bounds on
-// the separation is at most that, up to rounding. The walk may err; every claim is certified.
+// kEndsAtSign, the walk continues, as a start for distances, until half the width of its bounds on
+// the separation is at most `max_error`, up to rounding. The walk may err; every claim is
+// certified.
 // SEPARATED: the support value is below -SupportError. OVERLAPPING: the origin is inside a
 // tetrahedron of vertices of A - B by more than the error of its volumes. WITHIN_TOLERANCE: a point
 // of A - B and a supporting plane of A - B are both within the tolerance of the origin. `first`:
@@ -39,10 +40,10 @@ inline constexpr double kEndsAtSign = -1;
 FloatSearchResult SearchInFloatingPoint(const FloatPair& pair, double tolerance,
                                         const PlainVector& first, double max_error = kEndsAtSign);
 
-// Proves the cached suggestion of an earlier query at the current poses; undecided if that fails.
-// Then, if hulls that touched may touch along the same axis, the result contains that axis and the
-// cached pairs; otherwise it contains no pairs. Requires: pair.usable(), and that the pairs of the
-// cache are vertices of these hulls.
+// Tries to prove the cached suggestion of an earlier query at the current poses; the result is
+// undecided if this fails. In that case, if hulls that touched before may touch along the same axis
+// again, the result contains that axis and the cached pairs; otherwise it contains no pairs.
+// Requires: pair.usable(), and that the pairs of the cache are vertices of these hulls.
 FloatSearchResult TryCached(const FloatPair& pair, const PairCache& cache);
 
 }  // namespace hulld

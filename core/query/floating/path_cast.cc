@@ -11,13 +11,14 @@
 namespace hulld {
 namespace {
 
-// Maximum number of support vertices of a cast. More occur only if rounding hinders it. A choice.
+// Maximum number of support vertices of a cast. A cast needs more only if rounding hinders it. Not
+// tuned.
 constexpr int kMaxSteps = 96;
 // Share of the time up to a plane that its interval leaves open, more than rounding takes. A
 // choice.
 constexpr double kOpenShare = 0x1p-40;
 // Weight of another point in the point that casts start from, so that symmetric hulls that move
-// along their symmetry axis are not a special case. A choice.
+// along their symmetry axis are not a special case. Not tuned.
 constexpr double kOffCenter = 0x1p-5;
 
 // A lower bound on the gap along a unit direction, at time 0 and changing with time.

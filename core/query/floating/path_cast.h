@@ -30,8 +30,8 @@ struct PathCast {
   enum class Outcome : uint8_t { kUndecided, kSeparated, kFacet };
 
   Outcome outcome = Outcome::kUndecided;
-  // The pair is separated from time 0 up to and including this one, along `direction`; 0 if no such
-  // plane was found. kSeparated: 1.
+  // The pair is separated along `direction` from time 0 up to and including this time; 0 if no
+  // separating plane was found, 1 if kSeparated.
   double separated_until = 0;
   Vector direction = Vector::Zero();
   // kFacet: the vertices of the triangle of C that the path enters first, up to rounding.

@@ -42,8 +42,8 @@ class Simplex {
   [[gnu::always_inline]] void Set(const LaneVector& p, VertexPair pair) { Keep(kAlone, p, pair); }
 
   // Adds a corner and reduces to the part nearest to the origin, up to rounding. Sets n to a
-  // direction from that part toward the origin. Returns false if the origin is in the tetrahedron,
-  // which then stays. Requires: 0 < count() < 4.
+  // direction from that part toward the origin. Returns false, and keeps the tetrahedron, if it
+  // contains the origin. Requires: 0 < count() < 4.
   [[gnu::always_inline]] bool Add(const LaneVector& p, VertexPair pair, LaneVector& n) {
     HULLD_DCHECK(count_ > 0 && count_ < 4);
     const Lanes zero = {0, 0, 0, 0};
@@ -172,7 +172,7 @@ class Simplex {
   // The lanes of the corners, p last.
   static constexpr uint8_t kLanes[8][4] = {{0, 1, 2, 2}, {1, 2, 0, 0}, {2, 0, 1, 1}, {0, 1, 1, 1},
                                            {1, 0, 0, 0}, {2, 0, 0, 0}, {0, 0, 0, 0}, {0, 1, 2, 3}};
-  // Set in the lanes that keep their corners, and in those that are not in use.
+  // Set in the lanes that keep their corners and in unused lanes.
   static constexpr LaneIds kKept[7] = {{-1, -1, 0, 0}, {0, -1, -1, 0}, {-1, 0, -1, 0},
                                        {-1, 0, 0, 0},  {0, -1, 0, 0},  {0, 0, -1, 0},
                                        {0, 0, 0, 0}};

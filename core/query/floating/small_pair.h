@@ -50,7 +50,7 @@ class SmallPair {
     const VertexPair place = PlaceAlong(LaneVector(n));
     return {VertexAt(place), Dot(n, Difference(place))};
   }
-  // Farthest; sets w to the vertex.
+  // Like Farthest above; also sets w to the vertex.
   [[gnu::always_inline]] FloatPair::Support Farthest(const LaneVector& n, LaneVector& w) const {
     const VertexPair place = PlaceAlong(n);
     const auto difference = [&](const double* a, const double* b, Lanes& lanes)

@@ -57,7 +57,7 @@ inline constexpr double kDefaultRelativeResolution = 1e-9;
 
 // Minimum MotionOptions::resolution, relative to the sum of the largest absolute coordinates of the
 // hulls and of their translations. Above the rounding errors of planes, which
-// kMotionPlaneErrorFactor bounds. A choice.
+// kMotionPlaneErrorFactor bounds. Not tuned.
 inline constexpr double kMinRelativeResolution = 0x1p-38;
 
 // Returns OK, or INVALID_ARGUMENT for a max_time_error outside (0, 1], or a resolution that is

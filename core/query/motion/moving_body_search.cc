@@ -15,7 +15,7 @@ namespace hulld {
 namespace {
 
 // Pairs that cannot be first are dropped when the number of pairs that met has doubled and is at
-// least this. A choice.
+// least this. Not tuned.
 constexpr size_t kMinToDrop = 64;
 
 std::vector<uint32_t> PiecesOf(const MovingBody& body) {

@@ -23,9 +23,9 @@ namespace hulld {
 struct BodyContact {
   // Has no intervals and no certificate; `of_body` has those of the pairs of pieces.
   FirstContact contact;
-  // The pair of pieces that meets first; of several that meet at the same time, one with the
-  // strongest relation. If no pair meets, the first pair that may meet within the resolution, if
-  // any.
+  // The pair of pieces that meets first or, if several meet at the same time, a pair among them
+  // with the strongest relation. If no pair meets, the first pair that may meet within the
+  // resolution, if any.
   //
   // If requested, certificates for all pairs of nonempty pieces, in ascending order of A's piece,
   // then B's: intervals from 0 to separated_until, and relation kSeparated. The deciding pair has

@@ -21,7 +21,7 @@ namespace {
 using Quaternion = std::array<double, 4>;
 
 // A hull turns too far in an interval if a Bernstein coefficient of |q(t)|^2 is below this factor
-// times the larger |q|^2 at the ends: about 220 degrees if both have the same length. A choice.
+// times the larger |q|^2 at the ends: about 220 degrees if both have the same length. Not tuned.
 constexpr double kMinRelativeWeight = 0x1p-4;
 
 double LargestOf(const Quaternion& q) {
@@ -54,7 +54,7 @@ PlainVector TurnedBack(const Quaternion& p, const Quaternion& q, const PlainVect
   return (scale * n + (Dot(v, n) * u + Dot(u, n) * v)) - (p[0] * Cross(v, n) + q[0] * Cross(u, n));
 }
 
-// Hulls of at most this many points are scanned for several directions at once. A choice.
+// Hulls of at most this many points are scanned for several directions at once. Not tuned.
 constexpr size_t kMaxScanned = 16;
 
 // Two doubles in a register.
@@ -144,7 +144,7 @@ class MovingPlane::Bounds {
   // Computes the middle coefficients. Requires: usable().
   void AddMiddle();
 
-  // False if the hull turns too far.
+  // False if the hull rotates too far.
   bool usable() const { return usable_; }
   // The larger of |q|^2 at both ends.
   double weight() const { return weight_; }

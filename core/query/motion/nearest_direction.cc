@@ -12,7 +12,7 @@ namespace hulld {
 namespace {
 
 // Relative width of the distance bounds at which the walk ends: the maximum share of the gap that
-// the direction may lose. A choice.
+// the direction may lose. Not tuned.
 constexpr double kRelativeWidth = 0x1p-10;
 
 }  // namespace

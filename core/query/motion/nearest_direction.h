@@ -12,11 +12,12 @@
 
 namespace hulld {
 
-// Returns the direction from A to B along which they are nearest, with unit length up to rounding;
-// zero if the pair meets, or if floating point finds none. If pair.usable(), it is computed in
-// floating point; otherwise it is exact except for the final rounding. Proofs do not depend on its
-// accuracy. `first`: an initial direction, not zero. `nearest`, in and out: the vertex pairs of the
-// nearest points; the search begins with them, so pass the result of a similar pose, or none.
+// Returns the direction from A to B along which the hulls are nearest, with unit length up to
+// rounding; zero if the pair meets, or if floating point finds no direction. If pair.usable(), it
+// is computed in floating point; otherwise it is exact except for the final rounding. Proofs do not
+// depend on its accuracy. `first`: an initial direction, not zero. `nearest`, in and out: the
+// vertex pairs of the nearest points; the search begins with them, so pass the result of a similar
+// pose, or none.
 // CANCELLED: should_stop, which may be empty, returned true.
 absl::StatusOr<Vector> NearestDirection(const FloatPair& pair, const Vector& first,
                                         FloatCombination& nearest,

@@ -75,7 +75,7 @@ class RoundedPair {
   std::optional<FloatPair> pair_;
 };
 
-// Returns the error of a search that should_stop ended.
+// Returns the error of a search that was stopped by should_stop.
 inline absl::Status MotionStopped() { return absl::CancelledError("stopped in a motion"); }
 
 }  // namespace hulld

@@ -18,9 +18,9 @@ struct MovingBox {
   Box Around() const { return {start.low.cwiseMin(end.low), start.high.cwiseMax(end.high)}; }
 };
 
-// Returns a box that certainly contains the rounded hull at each time. For a translation, the boxes
-// of both ends (BoundingBox). A rotation may turn the hull in any direction, so its boxes are
-// cubes. Empty for an empty hull. Requires: a valid motion.
+// Returns a box that certainly contains the rounded hull at each time. For a translation, it
+// consists of the bounding boxes at both ends (BoundingBox). A rotation may turn the hull in any
+// direction, so its boxes are cubes. Empty for an empty hull. Requires: a valid motion.
 MovingBox MovingBoxOf(const MovingHull& moving);
 // Returns a box that certainly contains all pieces of the body at each time; see above.
 MovingBox MovingBoxOf(const MovingBody& moving);

@@ -23,7 +23,7 @@
 namespace hulld {
 namespace {
 
-// Factor between the strides of successive exact queries. A choice.
+// Factor between the strides of successive exact queries. Not tuned.
 constexpr int64_t kStrideFactor = 16;
 
 // Returns the position of a double among the non-negative doubles, in ascending order.

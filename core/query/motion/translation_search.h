@@ -54,7 +54,7 @@ class TranslationSearch {
     // Half the displacement of B relative to A, in the units of `pair`.
     IntegerVector half;
   };
-  // Knowledge about upper_.
+  // Evidence about upper_.
   enum class Upper { kUnknown, kContact, kSeparatedAfter };
 
   void Cast();

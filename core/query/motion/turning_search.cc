@@ -19,58 +19,59 @@ namespace hulld {
 namespace {
 
 // A step ends when this share of its gap is left, or, once it has made progress, after this many
-// trials. Choices.
+// trials. Not tuned.
 constexpr double kLeftShare = 0x1p-5;
 constexpr int kMaxTrials = 10;
 // A plane that turns replaces a constant one if, at the end of the latter, this share of its gap is
-// left along the nearest direction. A choice.
+// left along the nearest direction. Not tuned.
 constexpr double kTurnedShare = 0.5;
 // A plane turns by less than 60 degrees, so that its normal, linear in time, keeps more than 0.86
-// of its length. A choice.
+// of its length. Not tuned.
 constexpr double kMinCosine = 0.5;
-// Trials keep this share of an interval away from its ends. A choice.
+// Trials keep this share of an interval away from its ends. Not tuned.
 constexpr double kMinShare = 0x1p-4;
-// Share of the last step over which the rate of the gap is measured. A choice.
+// Share of the last step over which the rate of the gap is measured. Not tuned.
 constexpr double kRateShare = 0x1p-10;
-// A leap leaves at least this share of the distance to the likely contact, and this multiple of the
-// error expected from that of the last one. Choices.
+// A leap leaves at least this share of the distance to the likely contact, and at least this
+// multiple of the error expected from the error of the last leap. Not tuned.
 constexpr double kMinLeftShare = 0x1p-20;
 constexpr double kLeapSlack = 8;
-// A bracket below this width is narrow. A choice.
+// A bracket below this width is narrow. Not tuned.
 constexpr double kNarrowBracket = 0x1p-20;
 // Maximum number of times at which a passage is cut, and minimum share of an interval on either
-// side of a cut. Choices.
+// side of a cut. Not tuned.
 constexpr int kMaxCuts = 10;
 constexpr double kMinCutShare = 0x1p-5;
-// Two directions count as equal if the gaps along them differ by less than this share. A choice.
+// Two directions count as equal if the gaps along them differ by less than this share. Not tuned.
 constexpr double kSameShare = 0x1p-6;
-// Factor between the lengths of successive steps, at first trial. A choice.
+// Factor between the lengths of successive steps, at first trial. Not tuned.
 constexpr double kGrowth = 4;
-// A tolerable step that is shorter than this makes no progress. A choice.
+// A tolerable step shorter than this makes no progress. Not tuned.
 constexpr double kShortestStep = 0x1p-50;
 // Between hulls that are nearer than this share of their size, a step shorter than the second share
-// of the last one may be due to the error of a floating-point direction. Choices.
+// of the last step may be due to the error of a floating-point direction. Not tuned.
 constexpr double kExactShare = 0x1p-36;
 constexpr double kPoorShare = 0x1p-8;
 // An exact direction is expensive: only this many trials of a step compute one at their end, and
-// steps below this length or this share of the last one, whichever is less, are abandoned. Choices.
+// steps below this length or this share of the last one, whichever is less, are abandoned. Not
+// tuned.
 constexpr int kMaxExactTrials = 10;
 constexpr double kShortestExactStep = 0x1p-40;
 constexpr double kShortestExactShare = 0x1p-12;
 // The search does not try tolerable planes if a contact is likely to be this many times as deep as
-// the resolution. A choice.
+// the resolution. Not tuned.
 constexpr double kDeepShare = 64;
 // After the search is stuck, and before it tries tolerable planes, it looks for a contact at this
-// many times, each farther away by this factor. Choices.
+// many times, each farther away by this factor. Not tuned.
 constexpr int kMaxSoonTimes = 8;
 constexpr double kSoonGrowth = 4;
 // Before the search is stuck, it does not try tolerable steps below this share of the last length.
-// A choice.
+// Not tuned.
 constexpr double kMinTolerableShare = 0x1p-8;
 
-// Returns a time between `proven`, where a plane is proven with `gap`, and `failed`, where it is
-// not, with `failed_gap`: shortly before the gap would close. The loss of a plane is linear in time
-// if its direction is constant, and quadratic if it turns.
+// Returns a time shortly before the gap would close, between `proven`, at which a plane is proven
+// with `gap`, and `failed`, at which the plane fails with `failed_gap`. The loss of a plane is
+// linear in time if its direction is constant, and quadratic if it turns.
 double TrialBetween(double proven, double gap, double failed, double failed_gap, bool turned) {
   const double length = failed - proven;
   const double lost = gap / (gap - failed_gap);
@@ -290,7 +291,7 @@ absl::StatusOr<TurningSearch::Plane> TurningSearch::TryPlane(const Vector& n, do
   return plane;
 }
 
-// Returns a step from separated_ along the nearest direction, or none if there is no progress.
+// Returns a step from separated_ along the nearest direction, or none if no progress is possible.
 absl::StatusOr<std::optional<TurningSearch::Step>> TurningSearch::NextStep() {
   if (!is_nearest_) {
     const absl::StatusOr<Vector> n = DirectionAt(separated_);
@@ -478,8 +479,8 @@ absl::StatusOr<double> TurningSearch::TolerableUntil(bool thorough) {
   return time;
 }
 
-// Concludes a search in which no plane can be proven from separated_ on: if planes are usable, the
-// gap is below rounding.
+// Concludes a search in which no plane can be proven from separated_ on. If planes are usable, the
+// gap is then below the rounding error.
 absl::StatusOr<FirstContact> TurningSearch::ConcludeStuck() {
   const double latest = LatestContactTime();
   const absl::StatusOr<Relation> relation = RelationAt(latest);

@@ -112,7 +112,7 @@ class TurningSearch {
   Vector direction_ = Vector::Zero();
   // True if direction_ is the nearest direction at separated_.
   bool is_nearest_ = false;
-  // A time at which floating point found no gap; above 1 if none.
+  // A time at which floating point found no gap; above 1 if unknown.
   double contact_ = 2;
   // True if the nearest direction turns faster than the gap closes.
   bool turns_ = false;

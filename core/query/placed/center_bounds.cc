@@ -13,7 +13,7 @@ namespace hulld {
 namespace {
 
 constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
-// Cells along a side of a face, a power of two so that corners are exact. A choice. Observed: it
+// Cells along a side of a face, a power of two so that corners are exact. Not tuned. Observed: it
 // settles half of the pairs of round hulls of 512 vertices a few percent apart, and nearly all deep
 // overlaps (relation/ of tests/bench/queries/query_benchmark).
 constexpr uint32_t kCoarseSide = 2;

@@ -98,7 +98,7 @@ class CenterBounds {
     float gauge;
   };
 
-  // Inputs of the cells, and the computed cells.
+  // The data from which cells are computed, and the computed cells.
   struct Map {
     std::span<const Vector> points;
     Vector center;

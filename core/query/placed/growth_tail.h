@@ -17,7 +17,7 @@ namespace hulld {
 // read prefixes whose size was published to them.
 class GrowthTail {
  public:
-  // `center`: the origin of distances.
+  // `center`: the point from which distances are measured.
   GrowthTail(size_t capacity, const Vector& center)
       : blocks_((capacity + 3) / 4), radii_(4 * blocks_.size()), center_(center) {}
 

@@ -15,7 +15,7 @@ constexpr size_t kFirstTailCapacity = 16;
 constexpr uint64_t kScansPerPrepared = 800;
 // Average number of directions per query.
 constexpr uint64_t kDirectionsPerQuery = 6;
-// A new level absorbs preceding levels that are at most this many times larger.
+// A new level absorbs preceding levels that are at most this many times as large.
 constexpr size_t kMergeRatio = 2;
 
 std::vector<Vector> PointsOf(const LiveParts& parts, uint64_t count) {
@@ -41,7 +41,7 @@ std::shared_ptr<GrowthTail> CopyOf(const GrowthTail* tail, size_t begin, size_t 
   return copy;
 }
 
-// Prepares points. If no query can find many of them, drops these and prepares the rest.
+// Prepares points. If queries can never find many of them, drops these and prepares the rest.
 MappedPoints Map(std::vector<Vector> points) {
   MappedPoints mapped(std::move(points));
   const std::vector<uint32_t> listed = mapped.support.Listed();

@@ -12,8 +12,8 @@
 namespace hulld {
 
 // A hull at a pose, with the pose's derived data: built once, used for many pairs. With a radius it
-// is a rounded hull: the Minkowski sum of the hull, its core, and a closed ball. Queries are about
-// rounded hulls; members of this class describe the core.
+// is a rounded hull: the Minkowski sum of the hull, its core, and a closed ball. Queries refer to
+// rounded hulls, whereas the members of this class describe the core.
 class PlacedHull {
  public:
   // `hull` must outlive the result. INVALID_ARGUMENT: see ValidatePose.

@@ -14,7 +14,7 @@
 namespace hulld {
 namespace {
 
-// Sets of up to this many points are scanned: ten blocks of four. A choice, not tuned.
+// Sets of up to this many points are scanned: ten blocks of four. Not tuned.
 constexpr size_t kMaxScanned = 40;
 // Cells of the cube map per point. A choice: with two, of 16 bytes each, most cells list at most
 // four points.
@@ -33,8 +33,8 @@ constexpr size_t kMaxCellsPerPoint = 8;
 // average for points all over a surface. The bound is for points along curves, where the number
 // doubles with every second division of a square.
 constexpr double kMaxCopies = 64;
-// Sets of up to this many points get only lists: because the number of copies grows with the square
-// root of the number of points, a tree saves nothing.
+// Sets of up to this many points get only lists. A tree would save nothing for them, because the
+// number of copies grows with the square root of the number of points.
 constexpr size_t kMaxPointsWithoutTree = 4096;
 // Fraction of candidates among all points beyond which scanning all is faster than sorting the
 // candidates.

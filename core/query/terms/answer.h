@@ -33,7 +33,7 @@ struct Answer {
   // If requested and neither hull is empty.
   Boxed<Certificate> certificate;
 };
-// A batch has one answer for each of its pairs.
+// A batch keeps an answer for each of its pairs.
 static_assert(sizeof(Answer) <= 64);
 
 }  // namespace hulld

@@ -26,8 +26,9 @@ struct Feature {
 // A direction (world frame) from A toward B, with max n.A <= min n.B over the reals. `direction`
 // is n rounded to unit length.
 //
-// FACET_A and FACET_B name the line: the direction may be minus the facet's outward normal, as in
-// the textbook, which tests each line once. The features belong to the direction.
+// FACET_A and FACET_B refer to a line: as in the textbook, which tests each line once, the
+// direction may be the facet's outward normal or its negative. The features belong to the
+// direction.
 struct SeparatingAxis {
   Vector direction;
   AxisKind kind;

@@ -23,9 +23,9 @@ using ExactDirection = std::variant<std::monostate, Vector, IntegerVector>;
 // (Steinitz 1913).
 //
 // Rounded hulls, with A and B their cores and r > 0 the sum of their radii. SEPARATED: min n.B -
-// max n.A > r |n|. TOUCHING: it is r |n|, and at most three pairs; the hull of their differences
-// comes within r of 0. OVERLAPPING: no direction, and at most four pairs; that hull comes nearer
-// than r.
+// max n.A > r |n|. TOUCHING: min n.B - max n.A = r |n|, and at most three pairs; the hull of their
+// differences has a point within r of 0. OVERLAPPING: no direction, and at most four pairs; the
+// hull of their differences has a point nearer to 0 than r.
 struct Certificate {
   ExactDirection direction;
   std::vector<VertexPair> pairs;

@@ -12,8 +12,8 @@ namespace hulld {
 
 // A motion X_WA(t) of frame A in the world over the times t in [0, 1]: the rotation q(t) = (1 - t)
 // q0 + t q1 and the translation x(t) = (1 - t) x0 + t x1 over the reals, for the quaternions and
-// translations of `start` and `end` as given. q1 and -q1 are the same rotation at the end of
-// different motions, and the lengths of q0 and q1 determine the speed.
+// translations of `start` and `end` as given. q1 and -q1 are the same rotation but the ends of
+// different motions, and the lengths of q0 and q1 determine the timing.
 struct Motion {
   Pose start;
   Pose end;

@@ -28,17 +28,17 @@ struct QueryOptions {
   bool want_separation = false;
   bool want_witness = false;
   bool want_normal = false;
-  // The largest acceptable bound on a requested separation, in the caller's length unit. If absent:
-  // kDefaultRelativeMaxError times the sizes of the hulls and the separation. If a double cannot
+  // The largest acceptable bound on a requested separation, in the caller's length unit. Defaults
+  // to kDefaultRelativeMaxError times the sizes of the hulls and the separation. If a double cannot
   // represent the value that accurately, the bound is its rounding error.
   std::optional<double> max_error;
   // Requests Answer::within_clearance: separation <= clearance, exactly. Always true at infinity,
   // never at -infinity.
   std::optional<double> clearance;
-  // tau >= 0, length. 0: the relation is always exact. Positive: the relation may be
-  // kWithinTolerance if |separation| <= tau. Cannot be combined with a requested separation,
-  // witness, normal, clearance or certificate, or with the textbook method, which need the exact
-  // relation (ValidateOptions).
+  // tau >= 0, in the caller's length unit. If 0, the relation is always exact. If positive, the
+  // relation may be kWithinTolerance if |separation| <= tau. Cannot be combined with a requested
+  // separation, witness, normal, clearance or certificate, or with the textbook method, which need
+  // the exact relation (ValidateOptions).
   double tolerance = 0;
   // Textbook only: maximum number of candidate axes; more are refused.
   uint64_t max_textbook_axes = std::numeric_limits<uint64_t>::max();

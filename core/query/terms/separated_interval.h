@@ -14,10 +14,10 @@ namespace hulld {
 // given.
 //
 // With an offset: n.p < offset - radius_A |n| for all points p of A, and n.p > offset + radius_B
-// |n| for all p of B. With an end, n and the offset are linear in t, from these at the start of the
-// interval to those at `until`, and the length of the longer direction stands for |n|, which it
-// bounds. For a vertex v, |q(t)|^2 (n.p(t) - offset) is a polynomial in t of degree 4, and its
-// Bernstein coefficients over the interval all have this sign.
+// |n| for all p of B. With an end, n and the offset change linearly in t from the start of the
+// interval to `until`, and |n| is replaced by the length of the longer direction, which bounds it.
+// For a vertex v, |q(t)|^2 (n.p(t) - offset) is a polynomial in t of degree 4, and its Bernstein
+// coefficients over the interval all have this sign.
 // Without an offset, for translations: n.(b(t) - a(t)) > (radius_A + radius_B) |n| for all vertices
 // a and b at both ends, where equality is allowed at `until` of the last interval before a contact.
 struct SeparatedInterval {

@@ -46,7 +46,7 @@ class OptionalSeparation {
 // Points of A and B (world frame) that attain the separation. Separated: the nearest points.
 // Touching: a common point. Overlapping: points that coincide after the shortest translation that
 // ends the overlap. `error` bounds the distance of each point from its hull, and from a point that
-// attains the separation. If several pairs are equally good, one of them.
+// attains the separation. If several pairs attain it, this is one of them.
 struct Witness {
   Vector p_WA;
   Vector p_WB;
@@ -54,10 +54,10 @@ struct Witness {
 };
 
 // The direction (world frame, from A toward B, unit length up to rounding) in which the separation
-// is attained. Separated: from the nearest point of A to that of B, which is unique. Overlapping:
-// the direction of the shortest translation of B that ends the overlap. Touching: normal to a plane
-// with A on one side and B on the other. If several directions are equally good, one of them.
-// `angle_bound`: the angle to the exact direction is at most this, in radians.
+// is attained. Separated: from the nearest point of A to the nearest point of B, which is unique.
+// Overlapping: the direction of the shortest translation of B that ends the overlap. Touching:
+// normal to a plane with A on one side and B on the other. If several directions attain it, this is
+// one of them. `angle_bound`: upper bound on the angle to the exact direction, in radians.
 struct Normal {
   Vector direction;
   double angle_bound = 0;

@@ -12,7 +12,7 @@
 
 namespace hulld {
 
-// The required accuracy of bounds of a length.
+// The required accuracy of bounds on a length.
 struct SeparationGoal {
   // Reached if half the width is at most absolute_error + relative_error * (size + length).
   double absolute_error = 0;
@@ -38,13 +38,13 @@ struct FloatCombination {
   std::array<double, 3> weights = {};
 };
 
-// Bounds proven in floating point of the distance of the origin from A - B, or from its boundary.
+// Bounds, proven in floating point, on the distance of the origin from A - B, or from its boundary.
 struct SeparationBounds {
   double low = 0;
-  // A unit direction, up to rounding; zero if none is known. Distances: that along which `low` is
-  // proven. Depths, if a point is requested: the outward normal n of the point's facet of a
-  // polytope in A - B. All facets of it that may be within `high` of the origin lie at n . p >=
-  // facet_low, up to the rounding of n . p.
+  // A unit direction, up to rounding; zero if none is known. For distances: the direction along
+  // which `low` is proven. For depths, if a point is requested: the outward normal n of the point's
+  // facet of a polytope in A - B. All facets of it that may be within `high` of the origin lie at n
+  // . p >= facet_low, up to the rounding of n . p.
   Vector direction = Vector::Zero();
   double facet_low = 0;
   double high = std::numeric_limits<double>::infinity();

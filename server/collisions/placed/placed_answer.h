@@ -95,7 +95,7 @@ class PairSearch {
 PlacedAnswer AskPlaced(const PlacementTable& table, uint32_t a, uint32_t b,
                        const QueryOptions& options, const MotionOptions& motion);
 
-// As AskPlaced, for a call without motions. cache: for a pair of hulls; may be null.
+// Like AskPlaced, for a call without motions. cache: for a pair of hulls; may be null.
 PlacedAnswer AskAtRest(const PlacementTable& table, uint32_t a, uint32_t b,
                        const QueryOptions& options, PairCache* cache);
 

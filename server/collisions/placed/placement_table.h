@@ -32,8 +32,8 @@
 
 namespace hulld::server {
 
-// Placements of a call, by index. Each is ready for queries, or has the reason why it cannot be
-// answered, with an empty hull as a stand-in.
+// Placements of a call, by index. Each is either ready for queries, or has an error that explains
+// why it cannot be answered and an empty hull as a stand-in.
 class PlacementTable {
  public:
   PlacementTable() = default;
@@ -47,7 +47,7 @@ class PlacementTable {
       v1::PackedPlacements& packed, const Caller& caller, uint64_t max_placements,
       const char* what);
 
-  // As Make, for the placements "a" and "b" of a pair. Returns the error of the first malformed
+  // Like Make, for the placements "a" and "b" of a pair. Returns the error of the first malformed
   // one.
   static absl::StatusOr<PlacementTable> MakePair(const v1::Placement& a, const v1::Placement& b,
                                                  const Caller& caller);
@@ -61,7 +61,7 @@ class PlacementTable {
   // options.should_stop returned true. WouldWait: see ReadPlan::may_wait.
   absl::Status Resolve(Registry& registry, const QueryOptions& options, const ReadPlan& plan);
 
-  // As Resolve, for repeated calls: looks up only hulls that changed since the last one.
+  // Like Resolve, for repeated calls: looks up only hulls that changed since the last one.
   absl::Status Refresh(Registry& registry, const QueryOptions& options, const ReadPlan& plan);
 
   size_t size() const { return hull_of_.size(); }
@@ -87,7 +87,7 @@ class PlacementTable {
   bool has_motions() const { return !end_poses_.empty(); }
   // The placement in motion, for a request with motions; an empty hull for a body.
   MovingHull MovingAt(size_t i) const { return {HullAt(i), MotionAt(i), RadiusAt(i)}; }
-  // As MovingAt, for a hull or body. Requires has_bodies().
+  // Like MovingAt, for a hull or body. Requires has_bodies().
   MovingBody MovingBodyAt(size_t i) const { return {bodies_[i].body(), MotionAt(i), RadiusAt(i)}; }
   // Bounding box of a placement at rest, in the world frame.
   Box BoxOf(size_t i) const {
@@ -97,7 +97,7 @@ class PlacementTable {
   MovingBox MovingBoxAt(size_t i) const;
   // The hull of a placement; empty for a body, or if it is not answerable.
   const QueryHull& HullAt(size_t i) const;
-  // As HullAt; for a body, the hull of the piece.
+  // Like HullAt; for a body, the hull of the piece.
   const QueryHull& HullOfPiece(size_t i, uint32_t piece) const {
     if (!has_bodies()) return HullAt(i);
     const auto pieces = bodies_[i].body().pieces();
@@ -126,7 +126,7 @@ class PlacementTable {
 
   // Requires a valid pose (ValidatePose).
   void Move(size_t i, const Pose& X_WH);
-  // As Move, for a caller that calls Refresh next.
+  // Like Move, for a caller that calls Refresh next.
   void SetPose(size_t i, const Pose& X_WH);
 
   // IDs of the hulls, excluding inline shapes. Contains no duplicates, unless packed placements

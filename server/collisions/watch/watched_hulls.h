@@ -23,8 +23,8 @@ namespace hulld::server {
 // The hulls and bodies of a collision watch, with the hulls of the bodies' pieces. Resolves them
 // again whenever they change.
 //
-// Invariant: after each round, everything that uses a hull uses the same version of it, which the
-// client received in this round or before. Not thread-safe.
+// Invariant: after each round, all users of a hull use the same version of it, which the client has
+// received in this round or an earlier one. Not thread-safe.
 class WatchedHulls {
  public:
   // The hulls and bodies resolved together, at one revision of the store.

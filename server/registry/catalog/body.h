@@ -115,7 +115,7 @@ class BodyTable {
   const Entries& entries() const { return entries_; }
   // Returns null if there is no body or the ID is unknown. Cost: O(log n).
   Entry* Find(const std::string& id);
-  // As Find, but adds an entry without a body if there is none.
+  // Like Find, but adds an entry without a body if there is none.
   Entry& Add(const std::string& id);
   // Sets the committed body; null for none. Requires an entry.
   void Set(Locked& locked, const std::string& id, std::shared_ptr<const Body> body);
@@ -138,7 +138,7 @@ class BodyTable {
   std::optional<uint64_t> most_;
 };
 
-// A body as seen by one call. References the hulls of its pieces; charged to --memory-limit.
+// A body as seen by one call. References the hulls of its pieces. Charged to --memory-limit.
 struct ServedBody {
   std::shared_ptr<const Body> body;
   // In the order of Body::hull_ids().

@@ -24,9 +24,9 @@ namespace hulld::server {
 // Changes committed by peer servers: Supersede moves a present hull to another version, and Vanish
 // moves it to kGone; work in progress on its builder is then reverted.
 //
-// The state also counts the changes in flight (submitted to the store, neither committed nor
-// refused) and records damage. Readers never touch the builder and see the committed state at any
-// time. Further conditions on transitions:
+// The state also counts the changes in flight (submitted to the store, but neither committed nor
+// refused), and records damage. Readers never touch the builder, and always see the committed
+// state. Further conditions on transitions:
 //
 //   - Only a present, undamaged hull grows. A creation or an end is a single change in flight; only
 //     chunks overlap, at most kMaxInFlight of them.

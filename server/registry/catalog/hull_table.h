@@ -24,7 +24,7 @@
 
 namespace hulld::server {
 
-// All data in memory of a small hull at rest, besides its record. The structures for queries and
+// All in-memory data of a small hull at rest, except for its record. The structures for queries and
 // growth are rebuilt at the next use, within a few microseconds.
 struct CompactHull {
   // Includes all vertices, and no point outside the hull.
@@ -112,9 +112,9 @@ class HullTable {
     HullPointer awake_;
     RestingHull resting_;
     bool is_absent_ = false;
-    // Looked up since the last visit of the hand.
+    // True if it was looked up since the last visit of the hand.
     bool is_used_ = false;
-    // Not looked up since the last call of RestIdle.
+    // True if it was not looked up since the last call of RestIdle.
     bool is_idle_ = false;
   };
   using Entries = std::map<std::string, Entry>;
@@ -133,7 +133,7 @@ class HullTable {
   std::optional<HullPointer> Ask(const std::string& id);
   // Prefetches the index entry of an ID that Ask or Find will look up.
   void Prefetch(const std::string& id) const { index_.prefetch(id); }
-  // As Ask, but returns null for an unknown ID.
+  // Like Ask, but returns null for an unknown ID.
   HullPointer Find(const std::string& id) { return Ask(id).value_or(nullptr); }
   // Adds a stored hull, at rest. Requires: no hull has its ID.
   void AddResting(const StoredHull& stored);

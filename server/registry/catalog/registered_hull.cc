@@ -404,7 +404,8 @@ absl::Status Gone(const std::string& id, const char* how) {
 
 absl::Status StoreDisagrees(const HullRecord& record) {
   return absl::UnavailableError(absl::StrCat(
-      "the store does not hold ", QuotedHull(record.hull_id), " as of revision ", record.revision,
+      "the store does not contain ", QuotedHull(record.hull_id), " as of revision ",
+      record.revision,
       ", the last known to this server; if this persists, the database was changed outside of "
       "hulld: restart this server"));
 }

@@ -130,7 +130,7 @@ class RegisteredHull {
   const std::vector<Vector>& builder_backlog() const { return in_flight_.backlog; }
   // Drops the builder unless a thread owns it.
   void DiscardBuilder(Locked& locked);
-  // Drops the builder of a small hull that no session appends to, and all that its changes in
+  // Drops the builder of a small hull that no session appends to, and all data that its changes in
   // flight needed.
   void DiscardUnneededBuilder(Locked& locked);
   // Adds a built chunk to the head, and completes its change. added: counts of its points.

@@ -142,7 +142,7 @@ struct CacheStatistics : MemoryStatistics {
   uint64_t misses = 0;
   // Hulls read back from the store.
   uint64_t loads = 0;
-  // Number of times that a peer server's points were added to a hull in memory.
+  // Number of times that points from a peer server were added to a hull in memory.
   uint64_t grown = 0;
   // Hulls found damaged in the store.
   uint64_t damaged = 0;

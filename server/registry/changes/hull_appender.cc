@@ -405,7 +405,7 @@ absl::Status LocalChanges::WhyNotBuilt(RegisteredHull& hull, const absl::Status&
   if (absl::IsDataLoss(cause)) state_.MarkDamaged(hull, cause);
   if (!absl::IsResourceExhausted(cause)) return cause;
   return LimitExceeded(
-      absl::StrCat(QuotedHull(hull.head().record.hull_id), " would hold too many vertices"),
+      absl::StrCat(QuotedHull(hull.head().record.hull_id), " would have too many vertices"),
       state_.limits.max_vertices_per_hull, "max-vertices-per-hull");
 }
 

@@ -45,8 +45,8 @@ struct PendingChunk;
 //     Queued chunks occupy no thread.
 //   - At most one change of a body is in flight (BodyTable::Entry::in_flight). Tasks that depend on
 //     the ID wait in the entry and resume in order after it.
-//   - A hull and a body never share an ID: a creation is refused if the other kind has the ID, and
-//     waits while a creation or an end of the other kind is in flight.
+//   - A hull and a body never share an ID: a creation is refused if an object of the other kind has
+//     the ID, and waits while a creation or an end of the other kind is in flight.
 //   - A change is invisible until the store commits it; a refused change leaves the previous state
 //     unchanged.
 //

@@ -94,8 +94,8 @@ class Committer {
   // Queues a barrier. Acquires only the lock of the queue. Cost: with peer servers, one store
   // query, shared by all waiting barriers.
   void AddBarrier(Barrier barrier);
-  // As AddBarrier for a blocking thread: if the committer is idle, the query is sent on this thread
-  // when `order` is released, without waiting for the committer's thread to wake up.
+  // Like AddBarrier, for a blocking thread: if the committer is idle, the query is sent on this
+  // thread when `order` is released, without waiting for the committer's thread to wake up.
   void StartBarrier(Locked& locked, Barrier barrier);
 
   CommitStatistics Statistics() const;

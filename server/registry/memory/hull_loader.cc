@@ -37,9 +37,9 @@ absl::StatusOr<std::shared_ptr<LiveHull>> MakeLive(const StoredHull& stored,
   const std::string& id = stored.record.hull_id;
   const uint64_t expected = stored.layout.base_vertices + stored.layout.delta_vertices;
   if (points->size() != expected || expected < stored.record.vertex_count) {
-    return DamagedHull(
-        id, absl::StrCat("it has ", points->size(), " of ", expected,
-                         " points, and its record says ", stored.record.vertex_count, " vertices"));
+    return DamagedHull(id, absl::StrCat("it has ", points->size(), " of ", expected,
+                                        " points, and its record states ",
+                                        stored.record.vertex_count, " vertices"));
   }
   if (!std::ranges::all_of(*points, [](const Vector& point) { return point.allFinite(); })) {
     return DamagedHull(id, "one of its points is not finite");

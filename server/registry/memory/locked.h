@@ -32,8 +32,8 @@ struct HoldStatistics {
   uint64_t max_lookups = 0;
 };
 
-// A mutex without barging: a waiting thread gets it before the releasing thread can acquire it
-// again, so work cut into slices yields between them. Measures its hold times.
+// A mutex without barging: a waiting thread gets the mutex before the releasing thread can acquire
+// it again, so work that is divided into slices yields between them. Measures its hold times.
 //
 // The next thread in line holds `entry_` while it waits. A returning thread waits for `entry_`, and
 // thus until the next one has the mutex.
@@ -180,7 +180,7 @@ class Locked {
   // Counts a lookup within this hold of the mutex.
   void NoteLookup() { ++mutex_.lookups_; }
   uint64_t lookups() const { return mutex_.lookups_; }
-  // As NoteLookup, but first yields if this hold has reached kMaxLookupsPerHold.
+  // Like NoteLookup, but first yields if this hold has reached kMaxLookupsPerHold.
   void NoteLookupOrYield() {
     if (lookups() >= kMaxLookupsPerHold) Yield();
     NoteLookup();

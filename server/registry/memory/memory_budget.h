@@ -22,8 +22,8 @@ enum class MemoryUse {
   // Queries: versions of hulls that they hold, placements and pairs of streams, pending changes of
   // watches.
   kReading,
-  // Hulls being changed, points pending for them, and replacements; also every hull that no store
-  // keeps.
+  // Hulls being changed, points pending for them, and replacements. Also every hull that is kept
+  // only in memory.
   kWriting,
 };
 
@@ -135,7 +135,7 @@ class MemoryBudget {
   // kMaxVisited accounts were visited. An account that cannot evict is visited again after all
   // other accounts.
   void Evict(Locked& owners);
-  // As Evict. RESOURCE_EXHAUSTED, with a retry delay: this use exceeds its share.
+  // Like Evict. RESOURCE_EXHAUSTED, with a retry delay: this use exceeds its share.
   absl::Status Check(Locked& owners, MemoryUse use);
   // Share of a use, and true if the use exceeds it.
   uint64_t share(MemoryUse use) const { return shares_[static_cast<size_t>(use)]; }
@@ -175,7 +175,7 @@ class MemoryPart {
 
   // Requires: all parts are of one budget.
   static void Pin(const MemoryParts& parts, bool pins);
-  // As Account::Count.
+  // Like Account::Count.
   void Count(int sign);
 
   const std::shared_ptr<MemoryBudget::Usage> usage_;

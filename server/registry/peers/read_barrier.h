@@ -20,7 +20,7 @@
 
 namespace hulld::server {
 
-// A part of the registry in which tasks wait for IDs.
+// A part of the registry in which tasks wait for the state of an ID.
 class PeerChangeListener {
  public:
   virtual ~PeerChangeListener() = default;

@@ -201,7 +201,7 @@ void HullReader::NoteView(Locked& locked, const HullPointer& hull, KnownHulls& h
 // except hulls that another reader is loading. Releases the mutex. Points that cannot be read, or
 // that a writer superseded, stay missing.
 void HullReader::LoadMany(Locked& locked, const HullsRead& read) {
-  // A choice: many lookups, so that threads are seldom started.
+  // Many lookups, so that threads are seldom started. Not tuned.
   constexpr size_t kMaxHulls = 4 * kMaxLookupsPerHold;
   KnownHulls& hulls = read.known;
   // At about 200 bytes per point, a twentieth of the memory limit: the readers' share is not

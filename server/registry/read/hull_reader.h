@@ -23,15 +23,15 @@ namespace hulld::server {
 // Returns hulls ready to be served, all at one revision.
 //
 // A read looks up kMaxLookupsPerHold hulls per hold of the mutex and releases it in between. At
-// the end it looks up the hulls that changed since, until one hold covers all remaining ones: then
-// all are at one revision. This terminates, because a commit takes longer than a lookup. Readers
-// and writers never wait for each other: a reader gets the version of the committed state, created
-// in O(1), and never uses a builder.
+// the end, it looks up the hulls that have changed since, until one hold covers all that remain:
+// all hulls are then at one revision. This terminates, because a commit takes longer than a lookup.
+// Readers and writers never wait for each other: a reader gets the version of the committed state,
+// created in O(1), and never uses a builder.
 //
 // A read waits only for the store: for the record of an unknown hull (RecordReader), and for points
 // that are not in memory. One reader loads a hull for all that request it
 // (RegisteredHull::is_loading). Other threads help a read that loads many hulls. A read finishes
-// its own loads before it waits for another read, because that one may be waiting for them.
+// its own loads before it waits for another read, because the other read may be waiting for them.
 //
 // Guarded by the registry's mutex, which this class acquires, and releases to wait and to prepare.
 class HullReader {
@@ -42,7 +42,7 @@ class HullReader {
   HullReader(const HullReader&) = delete;
   HullReader& operator=(const HullReader&) = delete;
 
-  // As Registry::Resolve, for a caller that repeatedly requests the same hulls: `known` persists
+  // Like Registry::Resolve, for a caller that repeatedly requests the same hulls: `known` persists
   // between calls, and only hulls changed since are looked up.
   absl::StatusOr<Resolved> Refresh(std::span<const std::string> ids, KnownHulls& known,
                                    const std::function<bool()>& should_stop,

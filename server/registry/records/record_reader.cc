@@ -115,7 +115,7 @@ absl::Status RecordReader::AwaitKnown(Locked& locked, std::span<const std::strin
   return Stopped(should_stop) ? Cancelled() : read;
 }
 
-// As AwaitKnown for the unknown ones among `ids`, which must include the first.
+// Like AwaitKnown for the unknown ones among `ids`, which must include the first.
 // RESOURCE_EXHAUSTED: readers exceed their share of --memory-limit.
 absl::Status RecordReader::AwaitMissing(Locked& locked, std::span<const std::string> ids,
                                         const std::function<bool()>& should_stop) {

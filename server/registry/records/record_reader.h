@@ -54,11 +54,12 @@ class RecordReader : public PeerChangeListener, public PageSource {
   RecordReader(const RecordReader&) = delete;
   RecordReader& operator=(const RecordReader&) = delete;
 
-  // State of an ID that a task requires. kLife: known, with no change of a body and no creation or
-  // end of a hull in flight. kQuiet: known, with nothing in flight.
+  // The state of an ID that a task requires. kLife: known, and no change of a body and no creation
+  // or end of a hull is in flight. kQuiet: known, and nothing is in flight.
   enum class For { kLife, kQuiet };
   // Runs `task` when the changes committed by peer servers so far are applied and the ID is in that
-  // state; or refuses, without the mutex. The task may run again by `again`, which waits likewise.
+  // state; or refuses, without the mutex. The task may run again by `again`, which waits in the
+  // same way.
   using Task = std::function<void(Locked& locked, const LockedTask& again)>;
   void WhenReady(const std::string& id, For need, Refusal refuse, Task task);
 
@@ -137,7 +138,7 @@ class RecordReader : public PeerChangeListener, public PageSource {
   ReadBarrier& barrier_;
   TaskPool& loaders_;
 
-  // Guarded by mutex_: reads that are not over, by ID; the ones not yet taken by a thread; and the
+  // Guarded by mutex_: the unfinished reads, by ID; the reads not yet taken by a thread; and the
   // number of reading threads.
   std::map<std::string, std::shared_ptr<Reading>> readings_;
   Readings due_;

@@ -254,7 +254,8 @@ HullPointer RegistryState::ApplyPeerChange(Locked& locked, const std::string& id
   const bool is_new = change.revision > revision();
   if (is_new) {
     Publish(change.revision);
-    // Includes hulls that were created and deleted in between: a reader must learn of the interval.
+    // Includes hulls that were created and deleted in between, because a reader must learn of that,
+    // too.
     recent_changes.Note(id);
   }
   if (hull != nullptr) {

@@ -236,7 +236,7 @@ class DeletionLog {
 // Thread-safe: guarded by the registry's mutex, which the Note functions require.
 class ChangeFeed {
  public:
-  // Maximum number of hulls visited or reported per hold of the mutex: some 50 us.
+  // Maximum number of hulls visited or reported per hold of the mutex; takes about 50 us.
   static constexpr size_t kMaxPerBatch = 512;
 
   // All must outlive this. Pending changes are charged to the budget. mark_interval: the interval
@@ -273,7 +273,7 @@ class ChangeFeed {
   // the watch was ended, or the store cannot be read; the next call reads again. Cost:
   // O(kMaxPerBatch).
   absl::StatusOr<WatchBatch> Next(const std::shared_ptr<Watch>& watch);
-  // Adds and removes watched IDs; later changes count. Requires a target with lists_existing =
+  // Adds and removes watched IDs, from the next change on. Requires a target with lists_existing =
   // false; `added` must be new to it, and `removed` included. Cost: one hash per ID.
   void ChangeIds(Watch& watch, std::span<const std::string> added,
                  std::span<const std::string> removed);

@@ -12,8 +12,9 @@
 
 namespace hulld::server {
 
-// The high-water mark of the write-ahead logs: a lower bound of their synced bytes. A start
-// compares the logs with it before it opens the database, which replays and deletes the logs.
+// The high-water mark of the write-ahead logs: a lower bound on their synced bytes. A starting
+// server compares the logs with the mark before it opens the database, which replays and deletes
+// the logs.
 struct LogMark {
   // The first bytes of a log.
   struct Synced {
@@ -59,7 +60,7 @@ absl::StatusOr<std::optional<LogMark>> ReadLogMark(rocksdb::FileSystem& files,
 rocksdb::IOStatus MakeLogMark(rocksdb::FileSystem& files, const std::string& path,
                               const LogMark& mark);
 // Overwrites the older slot. Requires: the generation is one above that of the last write. The
-// result survives a crash of the process; of the machine only after a sync.
+// result survives a crash of the process, but a crash of the machine only after a sync.
 rocksdb::IOStatus WriteLogMark(rocksdb::FSRandomRWFile& file, const LogMark& mark);
 
 }  // namespace hulld::server

@@ -89,9 +89,9 @@ constexpr char kTables[] = R"(
   ALTER TABLE hulld.deltas ALTER COLUMN vertices SET STORAGE EXTERNAL;)";
 
 // Settings of every session. The database aborts statements of a server that has disconnected, or
-// that stalls while it holds locks. The timeouts are a choice, as in session.cc, and shorter than
-// PostgresOptions::answer_time. Every statement uses an index, even if its plan was made when the
-// table was small.
+// that stalls while it holds locks. The timeouts are not tuned, like those in session.cc, and are
+// shorter than PostgresOptions::answer_time. Every statement uses an index, even if its plan was
+// made when the table was small.
 constexpr char kSettings[] = R"(
   SET search_path = '';
   SET default_transaction_isolation = 'read committed';

@@ -49,8 +49,8 @@ bool IsError(const PGresult* result) {
   }
 }
 
-// Defaults for missing keywords. Times in seconds, TCP's in milliseconds; a choice: longer than a
-// network glitch, shorter than an operator's patience.
+// Defaults for missing keywords. Times are in seconds, or in milliseconds for TCP: longer than a
+// network glitch, but shorter than an operator's patience. Not tuned.
 constexpr struct {
   const char* keyword;
   const char* value;

@@ -36,7 +36,7 @@ absl::StatusOr<Conninfo> ParseConninfo(const std::string& text);
 // Encodes a bigint in PostgreSQL's binary format. Revisions and other numbers stay below 2^63.
 inline std::string EncodeBigint(uint64_t number) { return BigEndian(number); }
 inline uint64_t DecodeBigint(std::string_view bytes) { return FromBigEndian(bytes); }
-// Encodes an integer likewise.
+// Encodes an integer in the same way.
 inline std::string EncodeInteger(uint32_t number) { return BigEndian(number); }
 
 // A one-dimensional array in PostgreSQL's binary format.
@@ -118,7 +118,7 @@ class Session {
   // Returns the payloads of the notices (LISTEN) received since the last call.
   std::vector<std::string> TakeNotices();
 
-  // As Ask for statements that commit. A warning counts as a loss: for example, the wait for a
+  // Like Ask for statements that commit. A warning counts as a loss: for example, the wait for a
   // standby was interrupted, so the transaction is committed, but not replicated as required.
   absl::StatusOr<std::vector<Rows>> AskToCommit(std::span<const Statement> statements);
   // Returns the version of the server: 150018 for 15.18.

@@ -49,10 +49,10 @@ std::unique_ptr<MotionMethod> MakeSampling(int poses);
 
 // Returns the peers available at build time; `turns`: for motions that rotate.
 //
-//   FCL                continuousCollide by conservative advancement on Convex<double>, the only of
-//                      its solvers for convex shapes that does not sample; it ignores toc_err
+//   FCL                continuousCollide by conservative advancement on Convex<double>, its only
+//                      solver for convex shapes that does not sample; it ignores toc_err
 //   Bullet             btContinuousConvexCollision; double precision, margin 0
-//   Bullet, scaled     the same on lengths times 1000, as its tolerance is a constant of 0.001
+//   Bullet, scaled     the same on lengths times 1000, because its tolerance is 0.001
 //   Bullet, cast       btSubsimplexConvexCast, for translations
 std::vector<std::unique_ptr<MotionMethod>> MakePeerMotions(bool turns);
 

@@ -25,7 +25,7 @@ class Stores {
 
   // kind: rocksdb, one or many. name: the name of the database or directory.
   std::unique_ptr<ChildServer> Start(const std::string& kind, const std::string& name) const;
-  // As Start, over an empty store.
+  // Like Start, but over an empty store.
   std::unique_ptr<ChildServer> StartEmpty(const std::string& kind, const std::string& name) const;
   std::unique_ptr<ChildServer> StartEmpty(const std::string& kind) const {
     return StartEmpty(kind, "bench_" + kind);

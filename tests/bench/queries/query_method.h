@@ -34,7 +34,7 @@ class QueryMethod {
                        const std::vector<QuerySet::Query>& queries) = 0;
   // Answers one query per verdict, starting with query `first`, from placed hulls.
   virtual void Answer(size_t first, std::span<Verdict> verdicts) = 0;
-  // As Answer, from poses; their conversion is part of the work.
+  // Like Answer, but from poses; their conversion is part of the work.
   virtual void AnswerFromPoses(size_t first, std::span<Verdict> verdicts) = 0;
   // True if MeasureDepths is supported.
   virtual bool knows_depth() const = 0;
@@ -43,7 +43,7 @@ class QueryMethod {
   // normal and witness points.
   virtual void MeasureDepths(size_t first, std::span<std::optional<double>> depths) = 0;
   virtual bool knows_distance() const = 0;
-  // As MeasureDepths, for the distance of separated hulls.
+  // Like MeasureDepths, but for the distance of separated hulls.
   virtual void MeasureDistances(size_t first, std::span<std::optional<double>> distances) = 0;
 };
 

@@ -57,7 +57,7 @@ struct RemoteWorkload {
   std::function<Sample(RemoteSubject&)> run;
   // Does the same work with core in this process; may be empty.
   std::function<Sample()> run_in_process = nullptr;
-  // As run_in_process, with hulls placed each time at the poses of the request; empty if
+  // Like run_in_process, but places the hulls each time at the poses of the request; empty if
   // run_in_process does that, or nothing needs placing.
   std::function<Sample()> run_placing = nullptr;
 };

@@ -131,7 +131,7 @@ TEST(Coverage, TrianglesWithoutAreaAreSegmentsAndPoints) {
   EXPECT_EQ(Cover(pieces, Triangle({3, 0, 0}, {3, 0, 0}, {3, 0, 0})).uncovered.size(), 1u);
 }
 
-TEST(Coverage, NoPieceCoversNothing) {
+TEST(Coverage, WithoutPiecesNothingIsCovered) {
   const Coverage coverage =
       Cover(std::vector<HullMesh>(), Triangle({0, 0, 0}, {1, 0, 0}, {0, 1, 0}));
   EXPECT_EQ(coverage.uncovered.size(), 1u);

@@ -38,7 +38,7 @@ TEST(ByteSource, SupportsThreeKindsOfLineEnds) {
   EXPECT_EQ(Lines(""), Strings{});
 }
 
-TEST(ByteSource, SkipsAUtf8Mark) {
+TEST(ByteSource, SkipsAUtf8ByteOrderMark) {
   EXPECT_EQ(Lines("\xEF\xBB\xBFx\ny"), (Strings{"x", "y"}));
   EXPECT_EQ(Lines("\xEF\xBB"), (Strings{"\xEF\xBB"}));
 }
@@ -83,7 +83,7 @@ TEST(ByteSource, RefusesUtf16WithAdvice) {
 }
 
 TEST(ByteSource, LinesMayCrossTheBuffer) {
-  // Around the buffer's size, every split of CR LF between two reads occurs.
+  // Sizes around the buffer's cover every split of CR LF between two reads.
   for (size_t length = (256 << 10) - 4; length < (256 << 10) + 4; ++length) {
     const std::string first(length, 'a');
     EXPECT_EQ(Lines(first + "\r\nb\r\nc"), (Strings{first, "b", "c"})) << length;

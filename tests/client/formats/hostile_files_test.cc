@@ -139,7 +139,7 @@ TEST(HostileFiles, DeclaredCountsAllocateNothing) {
   EXPECT_LT(PeakMemory() - before, 64l << 20);
 }
 
-TEST(HostileFiles, AListOfFourBillionItemsIsSkippedOnlyAsFarAsTheFileGoes) {
+TEST(HostileFiles, AListOfFourBillionItemsIsSkippedOnlyToTheEndOfTheFile) {
   const std::string head =
       "ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty list uint double l\n"
       "property float x\nproperty float y\nproperty float z\nend_header\n";

@@ -30,7 +30,7 @@ class GuardedServer : public server::ServerTest {
  protected:
   void SetUp() override {
     unsetenv("HULLD_TOKEN");
-    // As hullctl's main does.
+    // Like hullctl's main.
     std::signal(SIGPIPE, SIG_IGN);
     std::string pattern = ::testing::TempDir() + "/hulld_guarded_server_test_XXXXXX";
     ASSERT_NE(mkdtemp(pattern.data()), nullptr);

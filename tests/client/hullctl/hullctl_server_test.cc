@@ -384,7 +384,7 @@ TEST_F(HullctlQueries, SceneFindsCollisions) {
   EXPECT_THAT(ran.err, HasSubstr("placement 0:nope: hull \"nope\" not found"));
 }
 
-TEST_F(HullctlQueries, StreamAnswersEachLineByALine) {
+TEST_F(HullctlQueries, StreamAnswersEachLineWithALine) {
   Put("cube", server::Cube());
   const TempFile file("poses.jsonl",
                       R"({"placements":[{"hullId":"cube"},{"hullId":"cube"}],"pairs":[0,1]})"
@@ -459,7 +459,7 @@ TEST_F(HullctlQueries, StreamErrorsNameTheLineOrTheField) {
   EXPECT_THAT(ran.err, HasSubstr("contains no scene"));
 }
 
-TEST_F(HullctlQueries, AFileThatDoesNotExistIsNotOnlyAMissingHull) {
+TEST_F(HullctlQueries, AMissingFileIsReportedAlongWithTheMissingHull) {
   Put("cube", server::Cube());
   for (const char* name : {"part.stl", "part"}) {
     const Ran ran = Ask({"check", name, "cube"});

@@ -440,7 +440,7 @@ TEST_F(HullctlTest, GetShowsProperties) {
                              HasSubstr("inertia xy xz yz  -0.25 0 0 within 0\n")));
 }
 
-TEST_F(HullctlTest, AnAuditThatFindsSomethingFails) {
+TEST_F(HullctlTest, AnAuditWithAFindingFails) {
   fake_.PutHull("a", {});
   EXPECT_EQ(Ask({"get", "a", "--audit"}).code, 0);
   fake_.audit_finding = "edge 3 is not convex";

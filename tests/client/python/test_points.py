@@ -73,7 +73,7 @@ def test_the_name_of_a_file_is_refused_with_advice() -> None:
 
 def test_meshes_and_clouds_of_other_libraries_are_points(either: Any, name: str) -> None:
     class Buffer:
-        """As the vectors of Open3D: an array only for numpy."""
+        """Like the vectors of Open3D: an array only for numpy."""
 
         def __array__(self, dtype: Any = None, copy: Any = None) -> Any:
             return CUBE if dtype is None else CUBE.astype(dtype)

@@ -35,7 +35,7 @@ class JointFile : public testing::Test {
   std::vector<std::vector<double>> waypoints_;
 };
 
-TEST_F(JointFile, ColumnsGoToTheirJoints) {
+TEST_F(JointFile, ColumnsAreAssignedToTheirJoints) {
   for (const char* text : {"# a path\ntime,slide,shoulder\n0,0.6,1\n\n# half way\n1,0.7,-1\n",
                            "time;\"slide\";shoulder\n0;0.6;1\n1;0.7;-1\n",
                            "time slide shoulder\n0 0.6 1\n1  0.7 -1\n"}) {

@@ -367,7 +367,7 @@ TEST(CertificateCheck, RadiiCloseTheGapToTheLastBit) {
 TEST(CertificateCheck, PairsComeNearWithinEdgesTrianglesAndInsides) {
   Hull cube = At(Cube());
   cube.radius = 0.25;
-  // Above a facet, beside an edge, and inside.
+  // Above a facet, next to an edge, and inside.
   ExpectValid(kTouching, Direction(0, 0, 1, {{1, 0}, {3, 0}, {5, 0}, {7, 0}}), cube,
               Ball(0.5, 0.25, 0.5, 1.75));
   ExpectInvalid(kTouching, Direction(0, 0, 1, {{1, 0}, {3, 0}}), cube, Ball(0.5, 0.25, 0.5, 1.75),

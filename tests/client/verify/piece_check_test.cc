@@ -152,7 +152,7 @@ TEST_F(Touching, ACertificateOfAnotherPairIsRefused) {
   v1::PieceCertificate other = Contact();
   *other.mutable_certificate() = Beside().certificate();
   EXPECT_THAT(Fault(kTouching, {other, Beside()}, a_, b_),
-              HasSubstr("pieces 1 of A and 0 of B: the direction does not keep the insides apart"));
+              HasSubstr("pieces 1 of A and 0 of B: the direction does not separate the interiors"));
   other = Beside();
   *other.mutable_certificate() = Contact().certificate();
   EXPECT_THAT(Fault(kTouching, {Contact(), other}, a_, b_),

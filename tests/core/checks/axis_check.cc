@@ -135,8 +135,8 @@ std::string ExactFault(const Scene& scene, const IntegerVector& n, Relation rela
   return "";
 }
 
-// As ExactFault, for a direction known up to rounding: checks the gap, and that the features are
-// extreme, within that rounding times the size of the scene.
+// Like ExactFault, but for a direction known up to rounding: checks the gap, and that the features
+// are extreme, within that rounding times the size of the scene.
 std::string RoundedFault(const Scene& scene, const SeparatingAxis& axis) {
   const oracle::Point rounded = {axis.direction.x(), axis.direction.y(), axis.direction.z()};
   const std::vector<Integer> integers = oracle::ToIntegers(rounded);

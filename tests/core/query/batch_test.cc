@@ -174,7 +174,7 @@ TEST(Batch, CancellationCancelsOnlyTheRemainingPairs) {
   }
 }
 
-TEST(Batch, OnePairTooLargeForTheTextbookFailsAlone) {
+TEST(Batch, OnlyThePairTooLargeForTheTextbookFails) {
   const Hull cube = BuildHull(LatticeCube(2, 1));
   const Hull ball = BuildHull(FibonacciSphere(60));
   const QueryHull query_cube(cube);

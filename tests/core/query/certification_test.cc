@@ -65,7 +65,7 @@ TEST(Certificate, SomeOverlapsNeedFiveOrSixPairs) {
   }
 }
 
-TEST(Certificate, TheTextbookMethodReturnsOneToo) {
+TEST(Certificate, TheTextbookMethodReturnsCertificates) {
   const Hull cube = BuildHull(Cube());
   QueryOptions options = WantCertificate();
   options.method = Method::kTextbookSat;

@@ -83,7 +83,7 @@ TEST_F(MalformedMessage, AMalformedStreamMessageKeepsEarlierOnes) {
 }
 
 // An empty message is a message; the absence of a message is an end.
-TEST_F(MalformedMessage, IsNeitherAnEmptyOneNorNone) {
+TEST_F(MalformedMessage, DiffersFromAnEmptyMessageAndFromNone) {
   for (const Rpc rpc : {Rpc::kAppendPoints, Rpc::kStreamCollisions, Rpc::kWatchCollisions}) {
     EXPECT_EQ(Send(rpc, {}).error_code(), grpc::OK) << server::RpcName(rpc);
     EXPECT_THAT(Send(rpc, {""}).error_message(), HasSubstr("the message is empty"));
@@ -92,7 +92,7 @@ TEST_F(MalformedMessage, IsNeitherAnEmptyOneNorNone) {
 
 // The message is compressed to a thousandth of its size: formerly, 64 MiB were unpacked before they
 // were counted.
-TEST_F(MalformedMessage, CompressedOnesAreNotUnpacked) {
+TEST_F(MalformedMessage, CompressedMessagesAreNotDecompressed) {
   const auto stub = v1::HullService::NewStub(channel_);
   v1::CreateHullRequest request;
   request.set_hull_id(std::string(64 << 20, 'a'));

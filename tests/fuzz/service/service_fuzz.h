@@ -32,9 +32,9 @@ class ServiceFuzz {
   // of the API contract, or empty. Checks: each call ends with a listed status, replies are
   // consistent (reply_check.h), certificates prove their relations, answers of streams and scenes
   // equal a batch's, answers about a body follow from its pieces, hulls that the program cannot
-  // name are unchanged, all hulls are as acknowledged, and no call outlives the program. After some
-  // programs a durable store, or a backup of it, is reopened: every hull, its mesh, and its
-  // writer's sequence are unchanged.
+  // name are unchanged, all hulls equal their acknowledged states, and no call outlives the
+  // program. After some programs a durable store, or a backup of it, is reopened: every hull, its
+  // mesh, and its writer's sequence are unchanged.
   std::string Run(std::span<const uint8_t> program);
 
   // Coverage counts of all programs so far: "CreateHull OK", "CreateHull ALREADY_EXISTS",

@@ -200,7 +200,7 @@ TEST_F(Revocation, RevokingTheLastTokenRefusesEverything) {
 }
 
 // An unreadable file revokes nothing.
-TEST_F(Revocation, DoesNotFollowFromAFileThatCannotBeRead) {
+TEST_F(Revocation, IsNotCausedByAnUnreadableFile) {
   ReplaceTokens(kept_ + "half a li");
   grpc::ClientContext context;
   Be(context, "gone secret");
@@ -209,7 +209,7 @@ TEST_F(Revocation, DoesNotFollowFromAFileThatCannotBeRead) {
 }
 
 // The name stays, but the token or its rights change.
-TEST_F(Revocation, CountsAsOneWhenTheTokenOrItsRightsChange) {
+TEST_F(Revocation, IncludesChangesOfTheTokenOrItsRights) {
   const std::string narrower = TokenLine("gone", "read-only", "cell-1/", "gone secret");
   for (const std::string& line : {TokenLine("gone", "admin", "*", "next secret"), narrower}) {
     ReplaceTokens(kept_ + TokenLine("gone", "admin", "*", "gone secret"));

@@ -347,7 +347,7 @@ TEST_F(BodyProofs, ProofsOfStreamsAreCheckedAfterEachUpdate) {
   EXPECT_TRUE(stream->Close().ok());
 }
 
-TEST_F(BodyProofs, ATooLargeRowFailsAlone) {
+TEST_F(BodyProofs, OnlyTheTooLargeRowFails) {
   Put("cube", Cube());
   ASSERT_TRUE(PutBody("heap", std::vector<v1::Placement>(100, PlacementOf("cube"))).ok());
   ASSERT_TRUE(PutBody("less", std::vector<v1::Placement>(80, PlacementOf("cube"))).ok());

@@ -58,7 +58,7 @@ TEST_F(ErrorReasons, HullsAreNamed) {
           {"current_revision", std::to_string(hull.revision())}});
 }
 
-TEST_F(ErrorReasons, AReplacementOfNothingIsAtRevisionZero) {
+TEST_F(ErrorReasons, ReplacingAMissingHullReportsRevisionZero) {
   v1::ReplaceOpen open;
   open.set_hull_id("none");
   open.set_if_revision(5);
@@ -72,7 +72,7 @@ TEST_F(ErrorReasons, AReplacementOfNothingIsAtRevisionZero) {
          {{"hull_id", "none"}, {"if_revision", "5"}, {"current_revision", "0"}});
 }
 
-TEST_F(ErrorReasons, AGapNamesTheSequenceThatIsExpected) {
+TEST_F(ErrorReasons, AGapNamesTheExpectedSequence) {
   Appender writer(*hulls_, "h", "w", /*create_if_absent=*/true);
   ASSERT_TRUE(writer.Append(1, Cube()).has_value());
   EXPECT_TRUE(writer.Send(ChunkMessage(5, Cube())));
@@ -80,7 +80,7 @@ TEST_F(ErrorReasons, AGapNamesTheSequenceThatIsExpected) {
          {{"hull_id", "h"}, {"sequence", "5"}, {"expected_sequence", "2"}});
 }
 
-TEST_F(ErrorReasons, AStreamIntoADeletedHullSaysThatItIsGone) {
+TEST_F(ErrorReasons, AStreamToADeletedHullReportsThatItIsGone) {
   Appender writer(*hulls_, "h", "w", /*create_if_absent=*/true);
   ASSERT_TRUE(writer.is_open());
   ASSERT_TRUE(Delete("h").ok());
@@ -121,7 +121,7 @@ TEST_F(ErrorReasons, ALimitOfAQueryNamesItsNumberToo) {
          v1::ERROR_REASON_LIMIT_EXCEEDED, {{"flag", "max-textbook-axes"}, {"limit", "155"}});
 }
 
-TEST_F(ErrorReasons, DrainingAndAStoreInMemoryHaveReasonsOfTheirOwn) {
+TEST_F(ErrorReasons, DrainingAndAStoreInMemoryHaveTheirOwnReasons) {
   const Client client = MakeClient();
   Expect(client.SaveBackup([](const auto&) { return absl::OkStatus(); }),
          absl::StatusCode::kFailedPrecondition, v1::ERROR_REASON_STORE_IN_MEMORY, {});
@@ -130,7 +130,7 @@ TEST_F(ErrorReasons, DrainingAndAStoreInMemoryHaveReasonsOfTheirOwn) {
          {});
 }
 
-TEST_F(ErrorReasons, ProblemsInRepliesHaveThemToo) {
+TEST_F(ErrorReasons, ProblemsInRepliesHaveReasons) {
   Put("cube", Cube());
   v1::BatchCheckCollisionsRequest request;
   *request.add_placements() = PlacementOf("cube");
@@ -150,7 +150,7 @@ TEST_F(ErrorReasons, ProblemsInRepliesHaveThemToo) {
   EXPECT_EQ(reasons, expected);
 }
 
-TEST_F(ErrorReasons, GrpcsOwnErrorsHaveNone) {
+TEST_F(ErrorReasons, ErrorsOfGrpcHaveNoReason) {
   grpc::ClientContext context;
   context.TryCancel();
   v1::GetStatusResponse response;

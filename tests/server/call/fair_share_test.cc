@@ -61,7 +61,7 @@ TEST_F(FairShare, NoClientFillsTheServer) {
   EXPECT_EQ(Refusal(Rpc::kGetHull, "token:a"), "");
 }
 
-TEST_F(FairShare, AClientHasSoManyBatches) {
+TEST_F(FairShare, BatchesPerClientAreLimited) {
   Limits limits;
   limits.max_batches_per_client = 1;
   Begin(limits);
@@ -71,7 +71,7 @@ TEST_F(FairShare, AClientHasSoManyBatches) {
   EXPECT_EQ(Refusal(Rpc::kCheckCollision, "token:a"), "");
 }
 
-TEST_F(FairShare, APartIsKeptForSingleCalls) {
+TEST_F(FairShare, CapacityIsReservedForSingleCalls) {
   Limits limits;
   limits.max_calls = 12;
   limits.max_calls_per_client = 8;
@@ -89,7 +89,7 @@ TEST_F(FairShare, APartIsKeptForSingleCalls) {
   EXPECT_EQ(Refusal(Rpc::kCheckCollision, "token:b"), "max-calls");
 }
 
-TEST_F(FairShare, ACallWaitsForItsOwnPoolAlone) {
+TEST_F(FairShare, ACallWaitsOnlyForItsOwnPool) {
   Limits limits;
   limits.max_waiting_calls = 5;
   Begin(limits);
@@ -106,7 +106,7 @@ TEST_F(FairShare, ACallWaitsForItsOwnPoolAlone) {
 }
 
 // Thousands of new or woken watches wait.
-TEST_F(FairShare, StreamsThatWaitKeepOutNoSingleCall) {
+TEST_F(FairShare, WaitingStreamsRefuseNoSingleCall) {
   Limits limits;
   limits.max_waiting_calls = 5;
   Begin(limits);
@@ -120,7 +120,7 @@ TEST_F(FairShare, StreamsThatWaitKeepOutNoSingleCall) {
   EXPECT_EQ(Refusal(Rpc::kCheckCollision, "b"), "");
 }
 
-TEST_F(FairShare, CallsWithoutATokenHaveAShareOfTheirOwn) {
+TEST_F(FairShare, CallsWithoutATokenHaveTheirOwnShare) {
   Limits limits;
   limits.max_calls = 12;
   limits.max_anonymous_calls = 16;
@@ -138,7 +138,7 @@ TEST_F(FairShare, CallsWithoutATokenHaveAShareOfTheirOwn) {
 }
 
 // Clients open one watch for each connection, and fail without it.
-TEST_F(FairShare, AConnectionHasAWatchOfHealthOutsideOfAllShares) {
+TEST_F(FairShare, AConnectionHasAHealthWatchOutsideAllShares) {
   Limits limits;
   limits.max_anonymous_calls = 8;
   limits.max_calls = 1;

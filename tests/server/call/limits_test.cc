@@ -131,7 +131,7 @@ TEST_F(LimitsTest, StatusShowsEveryLimitEvenWhenTheServerIsFull) {
   EXPECT_TRUE(GetHull(&again).ok());
 }
 
-TEST_F(LimitsTest, AClientHasSoManyStreamsAndGetsThemBack) {
+TEST_F(LimitsTest, StreamsPerClientAreLimitedAndReleased) {
   Config config = TestConfig();
   config.limits.max_streams_per_client = 2;
   Restart(config);
@@ -173,7 +173,7 @@ TEST_F(LimitsTest, TheLimitPerClientHoldsRegardlessOfFreeSlots) {
 
 // A textbook query that takes hours runs in slices. A similar one that takes milliseconds is
 // answered meanwhile.
-TEST_F(LimitsTest, ALongTextbookQueryHoldsUpNoOther) {
+TEST_F(LimitsTest, ALongTextbookQueryDelaysNoOther) {
   Config config = TestConfig();
   config.limits.max_textbook_axes = uint64_t{1} << 40;
   Restart(config);

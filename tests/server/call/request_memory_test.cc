@@ -140,7 +140,7 @@ TEST(MessageLayout, StopsCountingSoonAfterTheLimit) {
   EXPECT_LT(counted, 11'000u);
 }
 
-TEST(RequestMemory, IsTakenAndGivenBack) {
+TEST(RequestMemory, IsReservedAndReleased) {
   RequestMemory memory(1000);
   {
     RequestMemory::Share share;

@@ -30,7 +30,7 @@ TEST(TraceContext, ReadsKnownFieldsOfLaterVersions) {
   }
 }
 
-TEST(TraceContext, TakesNothingElse) {
+TEST(TraceContext, RefusesAnythingElse) {
   const std::string text = "00-" + kTrace + "-" + kParent + "-01";
   for (std::string wrong :
        {std::string(), text.substr(1), text.substr(0, 54), text + "-", text + "0",

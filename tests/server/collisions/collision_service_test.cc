@@ -24,7 +24,7 @@ class CheckCollisionCall : public ServerTest {
   }
 };
 
-TEST_F(CheckCollisionCall, BothMethodsTellTheThreeRelationsApart) {
+TEST_F(CheckCollisionCall, BothMethodsDistinguishTheThreeRelations) {
   Put("cube", Cube());
   for (const v1::Method method :
        {v1::METHOD_UNSPECIFIED, v1::METHOD_CERTIFIED_SEARCH, v1::METHOD_TEXTBOOK_SAT}) {
@@ -38,7 +38,7 @@ TEST_F(CheckCollisionCall, BothMethodsTellTheThreeRelationsApart) {
   }
 }
 
-TEST_F(CheckCollisionCall, AnswersCarryTheVersionsTheyCameFrom) {
+TEST_F(CheckCollisionCall, AnswersNameTheVersionsOfTheirHulls) {
   Put("a", Cube());
   Put("b", Cube());
   const v1::CheckCollisionResponse response = Check(Pair(PlacementOf("a"), PlacementOf("b", 3)));
@@ -169,7 +169,7 @@ TEST_F(CheckCollisionCall, MalformedOrConflictingRequestsAreRejected) {
   exclude([](auto* r) { r->mutable_wanted()->set_clearance(1); }, "wanted.clearance");
 }
 
-TEST_F(CheckCollisionCall, MeasuresComeWhenWanted) {
+TEST_F(CheckCollisionCall, MeasuresAreReturnedOnRequest) {
   Put("cube", Cube());
   Create("empty");
   const auto check = [&](const v1::Placement& b, double clearance) {
@@ -212,7 +212,7 @@ TEST_F(CheckCollisionCall, MeasuresComeWhenWanted) {
                bare.has_within_clearance());
 }
 
-TEST_F(CheckCollisionCall, ATolerancePermitsNotToLookCloser) {
+TEST_F(CheckCollisionCall, AToleranceAllowsAnAnswerWithinTolerance) {
   Put("cube", Cube());
   const auto relation = [&](double x, double tolerance) {
     v1::CheckCollisionRequest request = Pair(PlacementOf("cube"), PlacementOf("cube", x));

@@ -269,7 +269,7 @@ TEST_F(StreamCollisionsCall, HullsChangeOnlyWhenRefreshed) {
 }
 
 // Refreshed after each of many chunks: every answer equals that of a single call.
-TEST_F(StreamCollisionsCall, AHullThatGrowsIsAskedAtEveryStep) {
+TEST_F(StreamCollisionsCall, AGrowingHullIsQueriedAtEveryStep) {
   Create("grows");
   Put("ball", Sphere(300));
   Appender appender(*hulls_, "grows", "w");
@@ -304,7 +304,7 @@ TEST_F(StreamCollisionsCall, AHullThatGrowsIsAskedAtEveryStep) {
   EXPECT_TRUE(stream.Finish().ok());
 }
 
-TEST_F(StreamCollisionsCall, AMoveCuresAMalformedPose) {
+TEST_F(StreamCollisionsCall, AMoveReplacesAMalformedPose) {
   Put("cube", Cube());
   Stream stream(*collisions_);
   const auto bad = PlacementOf("cube", std::numeric_limits<double>::quiet_NaN());

@@ -20,7 +20,7 @@ using ::testing::StartsWith;
 
 using FirstPairsTest = MovingPlacements;
 
-TEST_F(FirstPairsTest, FirstOnlyFindsWhatMayTouchFirst) {
+TEST_F(FirstPairsTest, FirstOnlyFindsThePairsThatMayTouchFirst) {
   Put("cube", Cube());
   std::mt19937 random(11);
   std::uniform_real_distribution<double> number(-8, 8);

@@ -67,7 +67,7 @@ TEST_F(MovingBodies, BodiesMeetWithTheirEarliestPieces) {
   EXPECT_EQ(both.first_contact().contact_time(), 0);
 }
 
-TEST_F(MovingBodies, BodiesAnswerAsTheirPieces) {
+TEST_F(MovingBodies, BodiesAreAnsweredLikeTheirPieces) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> number(-4, 4);
   for (int i = 0; i < 6; ++i) {
@@ -218,7 +218,7 @@ TEST_F(MovingBodies, PiecesWithPosesOfTheirOwnMove) {
 
 // Quarter turns and translations of these points are exact in doubles, so that a posed piece is
 // also a hull in the body's frame.
-TEST_F(MovingBodies, PosedPiecesAnswerAsHullsInTheFrameOfTheBody) {
+TEST_F(MovingBodies, PosedPiecesAreAnsweredLikeHullsInTheFrameOfTheBody) {
   std::mt19937 random(5);
   const auto between = [&](int low, int high) {
     return std::uniform_int_distribution<int>(low, high)(random);

@@ -86,7 +86,7 @@ TEST_F(MovingPlacements, RandomMotionsAreProven) {
   EXPECT_GT(counts[kOverlapping], 3);
 }
 
-TEST_F(MovingPlacements, ABatchAnswersAsSingleCalls) {
+TEST_F(MovingPlacements, ABatchAnswersLikeSingleCalls) {
   Put("cube", Cube());
   std::vector<v1::Placement> placements = {PlacementOf("cube"), PlacementOf("nothing"),
                                            TurningRod(), Ceiling()};
@@ -129,7 +129,7 @@ TEST_F(MovingPlacements, ABatchAnswersAsSingleCalls) {
   EXPECT_EQ(proof, columns.motion_proofs_size());
 }
 
-TEST_F(MovingPlacements, PackedMotionsAnswerAsListed) {
+TEST_F(MovingPlacements, PackedMotionsAreAnsweredLikeListedOnes) {
   Put("cube", Cube());
   const std::vector<v1::Placement> placements = {PlacementOf("cube"),
                                                  MovingTo(PlacementOf("cube", 3), -1)};

@@ -213,7 +213,7 @@ TEST_F(LimitedScene, GroupsMoversAndDetailsApply) {
   EXPECT_EQ(found.totals.separated(), 3);
 }
 
-TEST_F(LimitedScene, ARowWithoutItsCertificateFailsAlone) {
+TEST_F(LimitedScene, OnlyTheRowWithoutItsCertificateFails) {
   Put("cube", Cube());
   ASSERT_TRUE(PutBody("heap", std::vector<v1::Placement>(100, PlacementOf("cube"))).ok());
   v1::FindCollisionsRequest request;

@@ -140,7 +140,7 @@ TEST_F(FindCollisionsCall, GroupsAndMoversLeavePairsOut) {
   EXPECT_THAT(found([](auto* r) { r->set_movers(0); }), IsEmpty());
 }
 
-TEST_F(FindCollisionsCall, ATolerancePermitsNotToLookCloser) {
+TEST_F(FindCollisionsCall, AToleranceAllowsAnAnswerWithinTolerance) {
   Put("cube", Cube());
   auto request = Row({0, 1, 3});
   request.set_tolerance(0.25);

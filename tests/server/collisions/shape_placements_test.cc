@@ -155,7 +155,7 @@ class InlineShapes : public ServerTest {
   }
 };
 
-TEST_F(InlineShapes, AnswerAsRegisteredHulls) {
+TEST_F(InlineShapes, AreAnsweredLikeRegisteredHulls) {
   const std::vector<Coordinates> shapes = Shapes();
   for (size_t i = 0; i < shapes.size(); ++i) Put(absl::StrCat("hull", i), shapes[i]);
   for (size_t i = 0; i < shapes.size(); ++i) {
@@ -175,7 +175,7 @@ TEST_F(InlineShapes, AnswerAsRegisteredHulls) {
   }
 }
 
-TEST_F(InlineShapes, TextbookTakesThem) {
+TEST_F(InlineShapes, TextbookAcceptsThem) {
   Put("cube", Cube());
   v1::CheckCollisionRequest registered = Pair(PlacementOf("cube"), PlacementOf("cube", 1));
   v1::CheckCollisionRequest request = Pair(Shape(Cube()), AtX(Shape(Cube()), 1));
@@ -235,7 +235,7 @@ TEST_F(InlineShapes, MeetBodies) {
   EXPECT_THAT(std::string(refused.message()), HasSubstr("pieces[2].points is set"));
 }
 
-TEST_F(InlineShapes, BatchesAnswerAsRegisteredHulls) {
+TEST_F(InlineShapes, BatchesAnswerThemLikeRegisteredHulls) {
   const auto scenes = Scenes();
   std::vector<v1::BatchCheckCollisionsRequest> requests(3);
   *requests[0].mutable_placements() = scenes[0].placements();
@@ -260,7 +260,7 @@ TEST_F(InlineShapes, BatchesAnswerAsRegisteredHulls) {
   EXPECT_EQ(answers[2], answers[0]);
 }
 
-TEST_F(InlineShapes, ScenesAnswerAsRegisteredHulls) {
+TEST_F(InlineShapes, ScenesAnswerThemLikeRegisteredHulls) {
   std::array<v1::FindCollisionsRequest, 2> scenes = Scenes();
   std::vector<std::string> answers;
   for (v1::FindCollisionsRequest& scene : scenes) {

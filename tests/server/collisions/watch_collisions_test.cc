@@ -185,7 +185,7 @@ TEST_F(WatchCollisions, FindsPairsThatComeTogetherByGrowthInAScene) {
   EXPECT_THAT(watch.Events(), ElementsAre("EXIT 0 2"));
 }
 
-TEST_F(WatchCollisions, AHullMayComeAndGo) {
+TEST_F(WatchCollisions, AHullMayAppearAndDisappear) {
   v1::CollisionWatchOpen open = Cubes({0});
   *open.add_placements() = PlacementOf("later", 0.5);
   *open.add_placements() = PlacementOf("bad//id");

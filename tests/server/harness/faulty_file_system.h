@@ -27,11 +27,11 @@ class FaultyFileSystem : public rocksdb::FileSystemWrapper {
     kNoSpace,
     // Writes, syncs, and directory changes fail.
     kIoError,
-    // As kIoError, with the error of a read-only file system.
+    // Like kIoError, but with the error of a read-only file system.
     kReadOnly,
     // Writes succeed, syncs fail.
     kSyncError,
-    // As kSyncError, for file systems that allocate space only at sync.
+    // Like kSyncError, but for file systems that allocate space only at sync.
     kNoSpaceAtSync,
     // Reads of table files (.sst) fail; everything else succeeds.
     kReadError,

@@ -235,7 +235,7 @@ TEST_F(WatchHulls, ASlowReaderReceivesTheLastStateOfEachHull) {
   EXPECT_LT(events, kHulls * kRounds);
 }
 
-// The client does not read while more hulls are created than one message holds.
+// The client does not read while more hulls are created than fit in one message.
 TEST_F(WatchHulls, AReaderFarBehindReceivesPresentAfterSynced) {
   const auto slow = SlowReader();
   Watch watch(*slow, {});

@@ -154,7 +154,7 @@ TEST_F(MigrateProgram, AKilledRunIsResumed) {
   }
   int code = 2;
   std::string error = "a hulld is active";
-  // The database takes a moment to notice the end of the last run. A completed migration is
+  // The database notices the end of the last run with a short delay. A completed migration is
   // refused.
   while (code == 2 && error.find("a hulld is active") != error.npos) {
     std::tie(code, error) = Migrate(options);

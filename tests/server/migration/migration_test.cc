@@ -300,7 +300,7 @@ TEST_P(MigrationTest, OnlyAnEmptyDestinationIsAccepted) {
   EXPECT_EQ(Migrate(*from_, *to_).code, 2);
 }
 
-TEST_P(MigrationTest, ARemainderOfAnotherMigrationIsLeftAlone) {
+TEST_P(MigrationTest, AnUnfinishedCopyOfAnotherStoreIsNotChanged) {
   ASSERT_TRUE(from_->Serve()->Put("h", CubeCorners()).ok());
   {
     auto target = to_->OpenTarget();

@@ -12,7 +12,7 @@ namespace heap_test {
 
 #ifdef HULLD_SANITIZED
 // Sanitizers' allocators retain freed memory to detect its use.
-TEST(Heap, DISABLED_FreeMemoryGoesBackOnlyWhenThereIsMuch) {
+TEST(Heap, DISABLED_OnlyLargeAmountsOfFreeMemoryAreReturned) {
 #else
 TEST(Heap, OnlyLargeAmountsOfFreeMemoryAreReturned) {
 #endif

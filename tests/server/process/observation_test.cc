@@ -69,7 +69,7 @@ class Observation : public ServerTest {
   // Returns the value of one series in Prometheus notation; -1 if missing.
   double Metric(const std::string& series) const { return ValueIn(Metrics(), series); }
 
-  // As Metric, in these metrics: values that must agree come from one collection.
+  // Like Metric, but in these metrics: values that must agree come from one collection.
   static double ValueIn(const std::string& metrics, const std::string& series) {
     std::istringstream lines(metrics);
     for (std::string line; std::getline(lines, line);) {
@@ -476,7 +476,7 @@ TEST(LogEventTest, TextIsQuotedAndEscapedWhereNeeded) {
 }
 
 // A watcher of grpc.health.v1; Debian does not ship its generated code.
-TEST_F(Observation, WatchersOfHealthSeeTheServerDrain) {
+TEST_F(Observation, HealthWatchesReportTheDrain) {
   grpc::GenericStub stub(channel_);
   grpc::ClientContext context;
   grpc::CompletionQueue queue;

@@ -158,7 +158,7 @@ TEST_F(RegistryFreshnessTest, ALinearizableReadSeesPeerChanges) {
   EXPECT_EQ(store_.asked(), before + 1);
 }
 
-TEST_F(RegistryFreshnessTest, ABoundThatHoldsIsAnsweredAtOnceAndSaysHowStale) {
+TEST_F(RegistryFreshnessTest, AReadWithinItsBoundIsAnsweredAtOnceWithItsStaleness) {
   ASSERT_TRUE(hulls_.Create("h").ok());
   store_.CreateElsewhere("i", 2);
   const int before = store_.asked();
@@ -176,7 +176,7 @@ TEST_F(RegistryFreshnessTest, ABoundThatHoldsIsAnsweredAtOnceAndSaysHowStale) {
   EXPECT_EQ(store_.asked(), before);
 }
 
-TEST_F(RegistryFreshnessTest, ABoundThatDoesNotHoldAsksTheStore) {
+TEST_F(RegistryFreshnessTest, AReadBeyondItsBoundQueriesTheStore) {
   store_.CreateElsewhere("h", 1);
   const Freshness freshness = AtMost(hours(1), hours(2));
   EXPECT_FALSE(IsAnsweredAtOnce("h", freshness));
@@ -189,7 +189,7 @@ TEST_F(RegistryFreshnessTest, ABoundThatDoesNotHoldAsksTheStore) {
   EXPECT_EQ(store_.asked(), before + 1);
 }
 
-TEST_F(RegistryFreshnessTest, ABoundThatIsHalfUsedUpHasTheStoreAskedOnceForReadsToCome) {
+TEST_F(RegistryFreshnessTest, AHalfExpiredBoundQueriesTheStoreOnceForLaterReads) {
   ASSERT_TRUE(hulls_.Create("h").ok());
   const int before = store_.asked();
   store_.Hold();
@@ -232,7 +232,7 @@ TEST_F(RegistryFreshnessTest, ALinearizableReadThatBeganBeforeAQueryNeedsNoOther
   EXPECT_EQ(store_.asked(), before);
 }
 
-TEST_F(RegistryFreshnessTest, ARevisionThatIsHereIsAnsweredHoweverOld) {
+TEST_F(RegistryFreshnessTest, AnAppliedRevisionIsAnsweredHoweverOld) {
   ASSERT_TRUE(hulls_.Create("h").ok());
   const int before = store_.asked();
   store_.Hold();
@@ -246,7 +246,7 @@ TEST_F(RegistryFreshnessTest, ARevisionThatIsHereIsAnsweredHoweverOld) {
   EXPECT_EQ(store_.asked(), before);
 }
 
-TEST_F(RegistryFreshnessTest, ARevisionThatIsNotHereIsWaitedFor) {
+TEST_F(RegistryFreshnessTest, AnUnappliedRevisionIsAwaited) {
   store_.CreateElsewhere("h", 7);
   ASSERT_FALSE(IsAnsweredAtOnce("h", AtLeast(7)));
   store_.Hold();
@@ -259,7 +259,7 @@ TEST_F(RegistryFreshnessTest, ARevisionThatIsNotHereIsWaitedFor) {
   EXPECT_EQ(answer->revision, 7);
 }
 
-TEST_F(RegistryFreshnessTest, ARevisionThatTheStoreHasNotGivenIsRefused) {
+TEST_F(RegistryFreshnessTest, AnUnassignedRevisionIsRefused) {
   store_.CreateElsewhere("h", 7);
   const absl::Status refused = Read("h", AtLeast(8)).status();
   EXPECT_TRUE(absl::IsFailedPrecondition(refused)) << refused;
@@ -268,7 +268,7 @@ TEST_F(RegistryFreshnessTest, ARevisionThatTheStoreHasNotGivenIsRefused) {
   EXPECT_EQ(MetadataOf(refused, "current_revision"), "7");
 }
 
-TEST_F(RegistryFreshnessTest, BothConditionsHoldWhereBothAreGiven) {
+TEST_F(RegistryFreshnessTest, BothConditionsHoldIfBothAreGiven) {
   ASSERT_TRUE(hulls_.Create("h").ok());
   Freshness freshness = AtMost(hours(1));
   freshness.at_least_revision = 1;
@@ -281,7 +281,7 @@ TEST_F(RegistryFreshnessTest, BothConditionsHoldWhereBothAreGiven) {
 }
 
 // Reads that accept the local state continue; the rest return the reason for their failure.
-TEST_F(RegistryFreshnessTest, AStoreThatCannotBeAskedStopsOnlyReadsThatNeedIt) {
+TEST_F(RegistryFreshnessTest, AnUnreachableStoreFailsOnlyReadsThatNeedIt) {
   ASSERT_TRUE(hulls_.Create("h").ok());
   store_.Fail(absl::UnavailableError("no database"));
   EXPECT_TRUE(absl::IsUnavailable(Read("h", {}).status()));
@@ -293,7 +293,7 @@ TEST_F(RegistryFreshnessTest, AStoreThatCannotBeAskedStopsOnlyReadsThatNeedIt) {
   EXPECT_FALSE(IsAnsweredAtOnce("h", AtMost(hours(1), hours(2))));
 }
 
-TEST_F(RegistryFreshnessTest, AChangeLeavesNothingToAskForReadsThatBeganBeforeIt) {
+TEST_F(RegistryFreshnessTest, AChangeSatisfiesReadsThatBeganBeforeIt) {
   Freshness began_before;
   began_before.began = SteadyClock::now();
   store_.CreateElsewhere("i", 1);

@@ -19,7 +19,7 @@ namespace registry_interleaving_test {
 
 // A reader is cancelled while it waits in the store for the points of a hull, and for points of
 // another hull that a third reader loads. Neither affects writers.
-TEST_F(RegistryInterleaving, AReaderThatIsCancelledHoldsNoWriterBack) {
+TEST_F(RegistryInterleaving, ACancelledReaderDelaysNoWriter) {
   const AppendSession a = Open("a", "w");
   const AppendSession b = Open("b", "w");
   ASSERT_TRUE(Append(a, 1, CubeCorners()).ok());
@@ -120,7 +120,7 @@ TEST_F(RegistryInterleaving, ManyHullsAreReadByManyThreads) {
 
 // Hulls that are deleted while many are read are not found, and a reader that waits for one is not
 // delayed by a cancelled reader.
-TEST_F(RegistryInterleaving, HullsThatAreReadTogetherMayGoOrBeWaitedFor) {
+TEST_F(RegistryInterleaving, HullsThatAreReadTogetherMayBeDeletedOrAwaited) {
   constexpr int kHulls = 300;
   std::vector<std::string> ids;
   for (int i = 0; i < kHulls; ++i) {
@@ -335,7 +335,7 @@ TEST_F(RegistryInterleaving, PointsThatMakeAnotherHullAreDamage) {
   }
 }
 
-TEST_F(RegistryInterleaving, ASequenceThatIsReadWhileAnotherIsCommittedIsTheNewer) {
+TEST_F(RegistryInterleaving, ASequenceReadDuringACommitIsTheNewerOne) {
   const AppendSession first = Open("h", "w");
   ASSERT_TRUE(Append(first, 1, {{0, 0, 0}}).ok());
   registry_.changes().CloseAppend(first);
@@ -355,7 +355,7 @@ TEST_F(RegistryInterleaving, ASequenceThatIsReadWhileAnotherIsCommittedIsTheNewe
 
 // The chunk is queued on a thread, not yet started, when the batch before it fails. The store has
 // the deletion before the registry: a writer's sequence read at that point belongs to no hull.
-TEST_F(RegistryInterleaving, ASequenceThatADeletionTookAwayIsNotThatOfTheHull) {
+TEST_F(RegistryInterleaving, ASequenceReadDuringADeletionIsNotThatOfTheHull) {
   const OpenResult first = OpenResultOf("h", "w");
   ASSERT_TRUE(Append(first.session, 1, CubeCorners()).ok());
   registry_.changes().CloseAppend(first.session);

@@ -199,7 +199,7 @@ TEST(FairMutexTest, WaitersGoFirst) {
   }
 }
 
-TEST(FairMutexTest, WaitingOnAConditionIsNoHold) {
+TEST(FairMutexTest, WaitingOnAConditionDoesNotCountAsHolding) {
   using Clock = std::chrono::steady_clock;
   FairMutex mutex;
   std::condition_variable condition;

@@ -134,7 +134,7 @@ TEST_F(RegistryMemory, APinnedVersionIsNotReadAgain) {
   EXPECT_EQ(registry.reader().Refresh(ids, known, {}, plan)->hulls[0]->served->high().x(), 2);
 }
 
-TEST_F(RegistryMemory, TheHullNotUsedForLongestIsDropped) {
+TEST_F(RegistryMemory, TheLeastRecentlyUsedHullIsDropped) {
   Limits limits;
   limits.memory_limit = 3 << 20;
   Start(limits);
@@ -168,7 +168,7 @@ TEST_F(RegistryMemory, PinnedVersionsStay) {
   EXPECT_EQ(hulls_->registry().Cache().loads, loads);
 }
 
-TEST_F(RegistryMemory, ReadersAndWritersGoOnUnderASmallLimit) {
+TEST_F(RegistryMemory, ReadersAndWritersContinueUnderASmallLimit) {
   Limits limits;
   limits.memory_limit = 2 << 20;
   Start(limits);
@@ -229,7 +229,7 @@ TEST(RegistryOfMemoryStore, RefusesToGrowBeyondTheLimit) {
 }
 
 // Points waiting for their turn, and their size after building.
-TEST(RegistryOfMemoryStore, PointsThatWaitCount) {
+TEST(RegistryOfMemoryStore, WaitingPointsCount) {
   MemoryStore store;
   TaskPool writers(2);
   Registry registry(store, Limits(), writers);
@@ -272,7 +272,7 @@ TEST(RegistryOfMemoryStore, PointsThatWaitCount) {
   EXPECT_EQ(registry.Cache().bytes, builder.MemoryBytes() + live.MemoryBytes());
 }
 
-TEST(RegistryOfMemoryStore, PointsThatAreRefusedCountNoMore) {
+TEST(RegistryOfMemoryStore, RefusedPointsNoLongerCount) {
   MemoryStore store;
   TaskPool writers(2);
   Limits limits;
@@ -320,8 +320,8 @@ TEST(RegistryOfMemoryStore, MemoryHeldByCallsCountsUntilTheyEnd) {
   EXPECT_EQ(registry.Cache().bytes, 0);
 }
 
-// A batch that names every hull, of which only some fit into the readers' share.
-TEST_F(RegistryMemory, MoreColdHullsThanReadersMayHoldAreRefusedWhileAppendsGoOn) {
+// A batch that names every hull, although only some fit into the readers' share.
+TEST_F(RegistryMemory, MoreColdHullsThanReadersMayHoldAreRefusedWhileAppendsContinue) {
   Limits limits;
   limits.memory_limit = 2 << 20;
   Start(limits);
@@ -353,7 +353,7 @@ TEST_F(RegistryMemory, MoreColdHullsThanReadersMayHoldAreRefusedWhileAppendsGoOn
 
 // A stream, for example, that never refreshes: its versions count until released, whatever happens
 // to the hull.
-TEST_F(RegistryMemory, AVersionThatAReaderHoldsCountsUntilItIsLetGo) {
+TEST_F(RegistryMemory, AVersionThatAReaderHoldsCountsUntilItIsReleased) {
   Start();
   Registry& registry = hulls_->registry();
   const std::vector<Vector> sphere = SpherePoints(2000);
@@ -471,7 +471,7 @@ TEST(RegistryOfMemoryStore, ASmallHullHasABuilderOnlyWhileASessionIsOpen) {
   EXPECT_EQ(hulls.Put("h", {{3, 0, 0}, {0, 0, 0}})->counts, (PointCounts{2, 1, 1, 0}));
 }
 
-TEST(RegistryOfMemoryStore, AnIdleHullComesBackAsItWas) {
+TEST(RegistryOfMemoryStore, AnIdleHullReturnsUnchanged) {
   MemoryRegistry hulls(std::make_unique<MemoryStore>());
   Registry& registry = hulls.registry();
   ASSERT_TRUE(hulls.Put("h", CubeCorners()).ok());

@@ -228,7 +228,7 @@ TEST_F(RegistryRecords, UnusedBodiesAreBoundedInBytes) {
 }
 
 // Otherwise it would be in memory twice.
-TEST_F(RegistryRecords, ABodyThatSomebodyHoldsStaysKnown) {
+TEST_F(RegistryRecords, ABodyInUseStaysCached) {
   Start(1);
   const std::vector<std::string> ids = {"b7"};
   const FoundBodies held = registry_.records().FindBodies(ids);
@@ -270,7 +270,7 @@ TEST_F(RegistryRecords, BodiesAreListedPageByPageWithoutBeingKept) {
   EXPECT_FALSE(registry_.records().FindBodies(Ids(10, 1, "b"), {}, false).status.ok());
 }
 
-// The batch that says so does not wait, although the existing hulls are not read yet.
+// The batch that reports the restart does not wait, although the existing hulls are not read yet.
 TEST_F(RegistryRecords, AWatchThatCannotResumeReportsThatItRestarted) {
   Start(10);
   ChangeFeed& feed = registry_.feed();

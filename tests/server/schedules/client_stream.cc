@@ -40,7 +40,7 @@ void Client::AppendStream() {
   if (!OpenStream(stream, !random().OneIn(4))) return;
   const bool waits = random().OneIn(2);
   uint64_t sequence = stream->last_sequence + 1;
-  // Resends, as a client does that lost its answer.
+  // Resends, like a client that lost its answer.
   if (sequence > 1 && random().OneIn(simulation_.plan.repetitions)) --sequence;
   for (uint32_t chunks = random().Below(4); chunks > 0; --chunks, ++sequence) {
     SendChunk(stream, sequence);

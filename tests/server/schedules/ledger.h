@@ -73,7 +73,7 @@ class Ledger {
     }
     return std::nullopt;
   }
-  // As Find, restricted to the states current at a revision of the store.
+  // Like Find, but restricted to the states current at a revision of the store.
   template <typename Predicate>
   std::optional<size_t> FindAt(size_t hull, const Moment& since, uint64_t revision,
                                const Predicate& explains) const {

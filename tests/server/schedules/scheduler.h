@@ -19,7 +19,7 @@ struct ScheduleFault {
   enum class Kind {
     // Threads wait, and none can run.
     kDeadlock,
-    // As kDeadlock, but the condition of a waiting thread is true: its notification is missing. A
+    // Like kDeadlock, but the condition of a waiting thread is true: its notification is missing. A
     // wait with a time limit also counts.
     kLostWakeup,
     // The schedule does not terminate.
@@ -87,7 +87,7 @@ class Scheduler {
   // A step visible to other threads; may switch threads.
   void Yield(const char* what, const void* object = nullptr,
              const Location& where = Location::current());
-  // As Yield, for the test or its store, with numbers that describe the step.
+  // Like Yield, but for the test or its store, with numbers that describe the step.
   void Note(const char* what, uint64_t first = 0, uint64_t second = 0, uint64_t third = 0);
   // Ends the schedule.
   [[noreturn]] void Fail(std::string what);

@@ -143,7 +143,7 @@ TEST(Scheduler, FindsNothingWhereMutexesAreHeld) {
 }
 
 // A chain of handovers. A notification before the wait must not break any of them.
-TEST(Scheduler, FindsNothingWhereConditionsAreUsedRightly) {
+TEST(Scheduler, FindsNothingWhereConditionsAreUsedCorrectly) {
   const auto fault = Find([] {
     constexpr int kThreads = 4;
     Mutex mutex;

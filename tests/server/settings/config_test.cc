@@ -252,7 +252,7 @@ TEST_F(ConfigTest, SizesAcceptUnits) {
   ExpectRefused({"--memory-limit=99999999999GiB"}, "is not a size");
 }
 
-TEST_F(ConfigTest, TheWrongOneOfSeveralVariablesOfTheProcessIsNamed) {
+TEST_F(ConfigTest, TheInvalidVariableAmongSeveralIsNamed) {
   // --listen is read before --max-hulls.
   ASSERT_EQ(setenv("HULLD_LISTEN", "127.0.0.1:0", 1), 0);
   ASSERT_EQ(setenv("HULLD_MAX_HULLS", "many", 1), 0);

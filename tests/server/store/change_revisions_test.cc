@@ -30,7 +30,7 @@ uint64_t Number(std::vector<Change>& changes, uint64_t revision) {
   return NumberChanges(pointers, revision);
 }
 
-TEST(NumberChanges, EachThatMayBeSeenTakesTheNextRevision) {
+TEST(NumberChanges, EachVisibleChangeTakesTheNextRevision) {
   const auto before = std::make_shared<const HullRevisions>(HullRevisions{1, 4, 2});
   std::vector<Change> changes = {Creation("h"), Chunk(before, VertexChange::kNone), Creation("i")};
   EXPECT_EQ(Number(changes, 7), 9);
@@ -63,7 +63,7 @@ TEST(NumberChanges, ChunksOfOneHullBuildOnEachOther) {
   EXPECT_EQ(before->change, 4);
 }
 
-TEST(NumberChanges, ABodyKeepsTheRevisionOfItsBeginning) {
+TEST(NumberChanges, ABodyKeepsItsCreateRevision) {
   std::vector<Change> changes(2);
   changes[0].body = std::make_shared<StoredBody>();
   changes[0].begins = true;

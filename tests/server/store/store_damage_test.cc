@@ -158,7 +158,7 @@ TEST_P(StoreDamage, ReplacingADamagedHullLeavesNothingAfterARestart) {
   for (const char* id : {"a", "b", "c"}) EXPECT_EQ(hulls_->View(id)->record.vertex_count, 8);
 }
 
-// Finding the remains of such a hull takes a scan of all records. A start scans, a deletion does
+// Finding the remains of a damaged hull takes a scan of all records. A start scans, a deletion does
 // not.
 TEST_F(RocksDbDamage, DeletingADamagedHullReadsNoOtherRecord) {
   FillThree();

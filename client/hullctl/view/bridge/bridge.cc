@@ -55,8 +55,8 @@ struct Shared {
   std::list<HttpConnection*> awaiting;
   std::thread::id io_thread;
   std::vector<std::weak_ptr<PageConnection>> pages;
-  // Each thread destroys the handler of a closed page. That waits for the handler's threads, which
-  // may wait for an answer from hulld; other pages must not be delayed by it.
+  // Threads that destroy the handlers of closed pages. The destruction waits for the handler's
+  // threads, which may be waiting for an answer from hulld, and must not delay other pages.
   std::vector<std::thread> reapers;
 };
 
@@ -120,7 +120,7 @@ class PageConnection final : public PageChannel,
 
   bool Enqueue(Message message) {
     std::unique_lock lock(mutex_);
-    // The io thread writes the queue: it must not wait for itself.
+    // The io thread writes the queue, so it must not wait for itself.
     if (std::this_thread::get_id() != shared_->io_thread) {
       room_.wait(lock,
                  [this] { return closed_ || queued_bytes_ <= shared_->options.max_queued_bytes; });

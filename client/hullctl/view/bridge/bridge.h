@@ -45,7 +45,7 @@ struct BridgeOptions {
 };
 
 // Serves the viewer's page over HTTP on 127.0.0.1, and one WebSocket to each page. Access control:
-// session_guard.h. Runs on its own thread. The header includes nothing of Boost.Beast, which takes
+// session_guard.h. Runs on its own thread. This header does not include Boost.Beast, which takes
 // many seconds to compile.
 class Bridge {
  public:

@@ -369,7 +369,7 @@ class Viewer {
       this.chooseCollidingPair();
     else
       this.ask(true);
-    // Hulls that appear later were part of the fit.
+    // The fit already included hulls that appear later.
     if (this.watch.ownsHulls) this.watch.show(0);
     document.body.dataset.fitted = document.body.dataset.scene || 'yes';
   }

@@ -4,7 +4,7 @@ import {SweepView} from 'hulld/drawing/sweep_view.js';
 import {MotionPanel} from 'hulld/panels/motion_panel.js';
 
 const PLAY_MS = 4000;
-// Steps of the slider: the times of a recording, as in client/hullctl/view/recording.h.
+// Steps of the slider: the recorded times, as in client/hullctl/view/recording.h.
 const STEPS = 64;
 
 export class Motion {

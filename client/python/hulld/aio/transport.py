@@ -175,7 +175,7 @@ class Duplex:
         return None
 
     async def expect(self, timeout: float | None) -> bytes:
-        """As `receive`, for a call that must not end yet. InternalError: the call ended."""
+        """Like `receive`, for a call that must not end yet. InternalError: the call ended."""
         message = await self.receive(timeout)
         if message is None:
             raise InternalError("the server ended the stream early")

@@ -41,11 +41,11 @@ class Method(IntEnum):
 
 
 class Rung(IntEnum):
-    """The method that decided an answer."""
+    """The stage that decided an answer."""
 
     UNSPECIFIED = 0
     BOUNDS = 1
-    #: The witness of the pair's previous answer in a stream.
+    #: The evidence that decided the pair's previous answer in a stream or watch.
     CACHED = 2
     #: Floating point with a proven error bound.
     FLOATING_POINT = 4
@@ -80,8 +80,8 @@ class HullVersion:
 
 @dataclass(frozen=True)
 class DecidingPiece:
-    """The piece of a body in the pair of pieces that decided. index: in the order of the body,
-    from 0. hull: the version of the piece's hull that the answer was computed from."""
+    """The piece of a body that decided an answer. index: position in the body's list, from 0.
+    hull: the version of the piece's hull from which the answer was computed."""
 
     index: int
     hull: HullVersion
@@ -102,8 +102,8 @@ class Separation:
 
 @dataclass(frozen=True)
 class Witness:
-    """Two points, x y z in the world frame, that attain the separation; each within `error` of
-    doing so."""
+    """Two points, x y z in the world frame, that attain the separation, each with an error of at
+    most `error`."""
 
     point_a: npt.NDArray[np.float64]
     point_b: npt.NDArray[np.float64]
@@ -112,11 +112,12 @@ class Witness:
 
 @dataclass(frozen=True)
 class Normal:
-    """The direction in which the separation is attained, from A toward B; one of them, if there are
-    several.
+    """The direction in which the separation is attained, from A toward B; if there are several, one
+    of them.
 
     direction: x y z in the world frame, of unit length up to rounding. SEPARATED: from the nearest
-    point of A to that of B. TOUCHING: normal to a plane that has A on one side and B on the other.
+    point of A to the nearest point of B. TOUCHING: normal to a plane with A on one side and B on
+    the other.
     OVERLAPPING: the direction of the shortest translation of B that ends the overlap. angle_bound:
     the angle to the exact direction is at most this, in radians (proven).
     """
@@ -140,9 +141,9 @@ class Feature:
 
 @dataclass(frozen=True)
 class Axis:
-    """A direction that proves that the hulls are separated or touch, not necessarily the one in
-    which they are nearest (see Normal). direction: x y z in the world frame, from A toward B, of
-    unit length up to rounding."""
+    """A direction that proves that the hulls are separated or touching, not necessarily the
+    direction in which they are nearest (see Normal). direction: x y z in the world frame, from A
+    toward B, of unit length up to rounding."""
 
     direction: npt.NDArray[np.float64]
     kind: AxisKind
@@ -198,7 +199,7 @@ class SeparatedInterval:
 class FirstContact:
     """The first contact of a pair in motion, over times from 0 to 1.
 
-    separated_until: the pair is separated (proven) at all times before; 1 when SEPARATED.
+    separated_until: the pair is separated (proven) at all times before this time; 1 when SEPARATED.
     contact_time: the pair is in contact at this time; equal to separated_until if the exact time is
     a double, and None when SEPARATED or WITHIN_TOLERANCE. intervals: the proof of the separation,
     if a certificate was requested; the certificate of the answer then applies at contact_time.
@@ -233,8 +234,8 @@ class HullSize:
 
 @dataclass(frozen=True)
 class Analysis:
-    """The work for an answer. time: seconds, without the network. axes_total: TEXTBOOK_SAT only,
-    else 0."""
+    """The cost of an answer. time: in seconds, excluding the network. axes_total: TEXTBOOK_SAT
+    only, else 0."""
 
     time: float
     size_a: HullSize
@@ -247,7 +248,7 @@ class Analysis:
 
 @dataclass(frozen=True)
 class Problem:
-    """The reason why a placement or a pair has no answer. code and reason: as in HulldError."""
+    """Explains why a placement or a pair has no answer. code and reason: as in HulldError."""
 
     code: str
     message: str
@@ -262,7 +263,7 @@ class Collision:
     normal: None if not requested, or if the pair has none. within_clearance: separation <=
     clearance; None without a clearance. hull_a, hull_b: the hulls or bodies of the answer, with
     their revisions. piece_a, piece_b: for a body, the piece that decided; axis, analysis, witness,
-    and normal refer to its hull. None for a hull, and if no pair of pieces decided alone.
+    and normal refer to its hull. None for a hull, and if no single pair of pieces decided.
     piece_certificates: with a body, the proof in place of the certificate; piece_hulls: then the
     hulls of all pieces, by ID. first_contact: for a motion, when the pair meets; if it never meets,
     the relation is SEPARATED. None without an end pose.
@@ -397,7 +398,7 @@ class AnswerRow:
 
 @dataclass(frozen=True)
 class Answers:
-    """Answers of several pairs, a row for each; m rows. answers[i] is row i as AnswerRow.
+    """The answers about m pairs, one row each. answers[i] is row i, as an AnswerRow.
 
     relations, rungs: m values of Relation and Rung, as uint8; compare them, as in relations ==
     Relation.TOUCHING. If requested: separations, separation_bounds (m), witness_points (m x 2 x 3:
@@ -405,7 +406,7 @@ class Answers:
     normal_angle_bounds (m), NaN in rows without one; within_clearance (m, bool); axes, analyses,
     certificates, None in rows without one. Otherwise None. problems: by row, the reason for a
     missing answer that is not in placement_problems. pieces: m x 2, the pieces of bodies that
-    decided, by index; -1 for a hull, and if no pair of pieces decided alone; None without bodies.
+    decided, by index; -1 for a hull, and if no single pair of pieces decided; None without bodies.
     piece_proofs: by row, for a pair with a body, the certificates of pairs of pieces; its entry of
     `certificates` is None. separated_until, contact_times: m, for motions, as in FirstContact; the
     contact time is NaN for a pair without a contact; None without motions. motion_proofs: by row,
@@ -587,7 +588,8 @@ class Batch(_Rows):
 
 @dataclass(frozen=True)
 class SceneTotals:
-    """Counts of pairs: queried; with intersecting boxes; found, by relation; without an answer."""
+    """The numbers of pairs: queried; with intersecting boxes; found, by relation; without an
+    answer."""
 
     pairs: int
     candidates: int

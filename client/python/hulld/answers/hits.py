@@ -19,8 +19,8 @@ class Hits:
     that is not a double is rounded up to the next one. For a placement with a radius or a rotation,
     a time is at most 2^-30 late, and NaN if the relation is WITHIN_TOLERANCE, which leaves open
     whether the ray hits it. points: k x 3, on the ray at that time. normals: k x 3, of unit length,
-    outward from the facet that is hit; within rounding of an edge or vertex, normal to some plane
-    that has the placement on one side; NaN if the ray starts in contact.
+    outward from the facet that is hit. Within rounding of an edge or vertex, they are normal to
+    some plane with the placement on one side; NaN if the ray starts in contact.
     """
 
     rays: npt.NDArray[np.uint32]
@@ -51,8 +51,8 @@ class Hits:
 
 
 def _normal(proof: Sequence[SeparatedInterval]) -> npt.NDArray[np.float64]:
-    """The plane that separates a ray from a hull until they meet is that of the facet, except within
-    rounding of an edge or vertex."""
+    """The plane that separates a ray from a hull until they meet is the plane of the facet, except
+    within rounding of an edge or vertex."""
     if not proof or proof[-1].direction is None:
         return np.full(3, np.nan)
     direction = proof[-1].end_direction or proof[-1].direction

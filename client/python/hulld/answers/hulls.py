@@ -17,7 +17,7 @@ from hulld.wire import Unsigned, packed_doubles, packed_varints, read_fields
 
 @dataclass(frozen=True)
 class Header:
-    """The store, and its revision that a reply describes. Revisions of different stores are
+    """The store and the revision that a reply describes. Revisions of different stores are
     unrelated. staleness: in seconds; the answer to a read with a Freshness includes at least every
     change committed that long before the call."""
 
@@ -31,11 +31,11 @@ class PointCounts:
     """Counts of points: received = outside + duplicate + inside."""
 
     received: int = 0
-    #: Became vertices, and still were at the end of their chunk.
+    #: Points that became vertices and were still vertices after their chunk.
     outside: int = 0
-    #: Equal to a vertex of the hull as it was after their chunk, beyond the first.
+    #: Points equal to a vertex that is already counted for another point, after their chunk.
     duplicate: int = 0
-    #: Inside the hull, or on its boundary without being a vertex.
+    #: All other points: inside the hull or on its boundary, but not vertices.
     inside: int = 0
 
     def __add__(self, other: PointCounts) -> PointCounts:
@@ -70,11 +70,11 @@ class Durability(IntEnum):
     """The guarantee of an acknowledgement."""
 
     UNSPECIFIED = 0
-    #: Held in memory: lost when the server ends.
+    #: In memory only: lost when the server exits.
     MEMORY = 1
-    #: Written, and synced to disk soon.
+    #: Written, and synced to disk soon afterwards.
     RELAXED = 2
-    #: Synced to disk before it was acknowledged.
+    #: Synced to disk before the acknowledgement.
     SYNC = 3
 
 
@@ -117,7 +117,7 @@ class BoundedValue:
 
 @dataclass(frozen=True)
 class HullProperties:
-    """Measures of a hull in its own frame, at density 1, in powers of the caller's length unit.
+    """Properties of a hull in its own frame, for density 1, in powers of the caller's length unit.
 
     Volume, centroid, and inertia are the doubles nearest to the exact values, and exact if their
     bound is 0. volume: 0 if the dimension is less than 3. area: of the surface; for a polygon, of
@@ -135,7 +135,7 @@ class HullProperties:
 
 @dataclass(frozen=True)
 class Hull:
-    """Sizes, counts and box of a hull.
+    """Sizes, point counts, and bounding box of a hull.
 
     edge_count, facet_count: None if not requested. box: 2 x 3, the lowest and the highest corner,
     in the caller's length unit; None when the hull is empty. audit, properties: None if not
@@ -230,7 +230,7 @@ class HullMesh:
         )
 
     def _repr_html_(self) -> str:
-        """As Hull._repr_html_."""
+        """Like Hull._repr_html_."""
         rows = [
             ("hull", self.info.hull_id),
             ("vertices", len(self.vertices)),
@@ -244,7 +244,7 @@ class HullMesh:
 
 @dataclass(frozen=True)
 class MeshHeader:
-    """The first part of a mesh: the sizes of all that follow. Other fields as in HullMesh."""
+    """The first part of a mesh: the sizes of the following parts. Other fields as in HullMesh."""
 
     info: HullInfo
     vertex_count: int

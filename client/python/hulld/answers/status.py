@@ -11,7 +11,7 @@ from hulld.v1 import status_pb2
 
 @dataclass(frozen=True)
 class Limits:
-    """The limits in force; each is a flag of the server."""
+    """The limits in force. Each is set by a flag of the server."""
 
     max_points_per_chunk: int
     max_vertices_per_hull: int
@@ -20,21 +20,21 @@ class Limits:
     max_textbook_axes: int
     max_message_bytes: int
     max_points_per_hull: int
-    #: In one batch, scene or stream.
+    #: Placements in a batch, scene, or stream.
     max_placements: int
     max_calls: int
     max_waiting_calls: int
     max_streams_per_client: int
     max_concurrent_batches: int
     max_pieces_per_body: int
-    #: Seconds for one request, or one message of a collision stream or watch; None: unlimited.
+    #: Seconds for a request, or for a message of a collision stream or watch; None: unlimited.
     max_request_time: float | None
     max_writers_per_hull: int
     memory_limit_bytes: int
     #: Limits per client: a token or, without tokens, an address.
     max_calls_per_client: int
     max_batches_per_client: int
-    #: Bytes that requests may take until they are answered.
+    #: Bytes for requests that are not answered yet.
     request_memory_bytes: int
 
 

@@ -24,7 +24,7 @@ from hulld.geometry.points import Points, PointsLike, as_points, chunks_of, poin
 from hulld.v1 import hull_pb2
 from hulld.wire import MessageWriter
 
-#: Points travel in messages of about this size.
+#: Points are sent in messages of about this size.
 DEFAULT_CHUNK_BYTES = 1 << 20
 
 

@@ -42,7 +42,7 @@ class Search:
         self._attempts: Attempts | None = None
 
     def wait_after(self, error: HulldError) -> float:
-        """As Attempts.wait_after."""
+        """Like Attempts.wait_after."""
         if self._attempts is None:
             self._attempts = Attempts(self._policy, True, self._patience)
         return self._attempts.wait_after(error)

@@ -18,15 +18,15 @@ FIELD = 15
 
 @dataclass(frozen=True)
 class Freshness:
-    """The freshness of a read if several servers serve one store, as in
-    proto/hulld/v1/freshness.proto. If both conditions are given, both must hold; without either, or
-    without a Freshness, the answer includes everything acknowledged before the call.
+    """The required freshness of a read when several servers share a store, as in
+    proto/hulld/v1/freshness.proto. If both conditions are given, both must hold. If neither is
+    given, or without a Freshness, the answer includes everything acknowledged before the call.
 
     at_least: the header of an earlier answer; the new answer comes from that revision of the store
     or a later one. A client that passes the header of its last answer sees its own changes and
-    never goes back in time, whichever server answers. max_staleness: in seconds; the answer
-    includes everything committed at least that long before the call, and needs no round trip to the
-    store while the server is that fresh. The answer's header.staleness bounds its age.
+    never sees an older state than before, whichever server answers. max_staleness: in seconds; the
+    answer includes everything committed at least that long before the call, and needs no round trip
+    to the store while the server is that fresh. The answer's header.staleness bounds its age.
     """
 
     at_least: Header | None = None

@@ -303,7 +303,7 @@ def check_collisions(
 
 @dataclass(frozen=True)
 class SceneFilter:
-    """As the keyword arguments of Client.find_collisions."""
+    """Like the keyword arguments of Client.find_collisions."""
 
     groups: npt.ArrayLike | None
     ignore_same_group: bool

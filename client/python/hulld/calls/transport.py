@@ -153,7 +153,7 @@ class Duplex:
         return None
 
     def expect(self, timeout: float | None) -> bytes:
-        """As `receive`, for a call that must not end yet. InternalError: the call ended."""
+        """Like `receive`, for a call that must not end yet. InternalError: the call ended."""
         message = self.receive(timeout)
         if message is None:
             raise InternalError("the server ended the stream early")

@@ -12,7 +12,7 @@ from hulld.v1 import collision_pb2
 
 @dataclass(frozen=True)
 class Wanted:
-    """As the keyword arguments of Client.check_collision. max_error requests the separation."""
+    """Like the keyword arguments of Client.check_collision. max_error requests the separation."""
 
     axis: bool = False
     analysis: bool = False

@@ -40,8 +40,8 @@ class Placement:
     sphere, a segment a capsule. end_pose: the pose at time 1 of a motion; None: the placement is at
     rest. At time t, the quaternion is (1 - t) q0 + t q1, and the translation (1 - t) x0 + t x1,
     exactly. Since q1 and -q1 are the same rotation, the sign with the shorter path is used. A
-    translation alone means the identity rotation at the end, as in any pose of this form.
-    ValueError: a malformed ID, shape, or radius, or not exactly one of ID and points.
+    translation alone means that the rotation at the end is the identity, as in any pose of this
+    form. ValueError: a malformed ID, shape, or radius, or not exactly one of ID and points.
     """
 
     id: str | None = None

@@ -11,10 +11,10 @@ import numpy.typing as npt
 
 from hulld import arguments
 
-#: Default of the largest entry of R Rᵀ - I that is accepted in a matrix. It is relative to 1, the
-#: length of a row: a hull of 1 m is then placed within about a nanometer of its position by the
-#: matrix. Products of hundreds of rotations in double precision stay far below (observed: 1e-13),
-#: float32 matrices do not (1e-7).
+#: Default of the largest entry of R Rᵀ - I that is accepted in a matrix. It is relative to
+#: the length of a row, which is 1: a hull of 1 m is then placed within about a nanometer of the
+#: position given by the matrix. Products of hundreds of rotations in double precision are far
+#: below it (observed: 1e-13), but float32 matrices are not (1e-7).
 ORTHOGONALITY_TOLERANCE = 1e-9
 
 PackedPoses = npt.NDArray[np.float64]

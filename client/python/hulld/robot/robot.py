@@ -104,11 +104,11 @@ class Robot:
     ) -> Self:
         """Reads a URDF file and its meshes, without a server.
 
-        Boxes, spheres, and capsules are exact; meshes become their convex hulls, cylinders
-        enclosing polyhedra. Shapes of one link are not checked against each other. Without `srdf`,
-        neither are adjacent links, which are connected by a joint, or by joints through links
-        without shapes; `adjacent` includes them. srdf: a file; exactly the pairs that it disables
-        are skipped.
+        Boxes, spheres, and capsules are exact. Meshes become their convex hulls, and cylinders
+        become enclosing polyhedra. Shapes of the same link are not checked against each other.
+        Without `srdf`, adjacent links are not checked either, that is, links connected by a joint,
+        or by joints through links without shapes; `adjacent` includes them. srdf: a file; exactly
+        the pairs that it disables are skipped.
 
         packages: folders by the name in package://NAME/. Other packages are searched in
         ROS_PACKAGE_PATH, AMENT_PREFIX_PATH, and the folders above the file. split: a mesh file of
@@ -316,8 +316,8 @@ class Robot:
         q: the waypoints, n x dof, n >= 2, or values by name. clearance: in meters; a separation of
         at most this counts as contact. resolution: in meters; a pair that comes this close to
         contact, or to the clearance, may remain undecided. Other arguments are as in `check`.
-        Contacts and free pairs hold for the exact motion of the joints: bounds cover the paths of
-        the links and all rounding. A pair is not checked after its contact.
+        Contacts and free pairs are proven for the exact motion of the joints: bounds cover the
+        paths of the links and all rounding. A pair is not checked after its contact.
 
         ValueError: q has another shape, no pair is left, a placement of the scene moves, or a part
         turns or moves too far between two waypoints. NotFoundError: a hull of the scene is missing.

@@ -22,7 +22,7 @@ from hulld.verification.rational import (
     surrounds_origin,
 )
 
-#: How much a relation claims: more than those with lower numbers.
+#: The strength of a relation's claim.
 STRENGTH = {Relation.SEPARATED: 0, Relation.TOUCHING: 1, Relation.OVERLAPPING: 2}
 
 
@@ -150,7 +150,7 @@ def check_pair(relation: Relation, certificate: Certificate, a: Piece, b: Piece)
             raise VerificationError("the direction does not separate: max n.A >= min n.B")
         return
     if n == ORIGIN or gap < 0:
-        raise VerificationError("the direction does not keep the insides apart: max n.A > min n.B")
+        raise VerificationError("the direction does not separate the interiors: max n.A > min n.B")
     if len(differences) > 4 or not holds_origin(differences):
         raise VerificationError("the vertex pairs show no common point")
 

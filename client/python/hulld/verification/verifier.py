@@ -59,7 +59,7 @@ class Verifier:
 
     def __init__(self, client: _Source) -> None:
         self._client = client
-        # The latest ones, each with its version; for the ID of a hull, no body.
+        # The latest meshes and bodies, each with its version. The ID of a hull has no body.
         self._meshes: dict[str, tuple[HullVersion, npt.NDArray[np.float64]]] = {}
         self._bodies: dict[str, tuple[HullVersion, Body | None]] = {}
 

@@ -30,7 +30,7 @@ TEST(DaeFile, CoordinatesAreTheNearestDoubles) {
   EXPECT_TRUE(std::signbit(read.xyz()[5]));
 }
 
-TEST(DaeFile, ComesInMetersWithItsAxesAsTheyAre) {
+TEST(DaeFile, IsConvertedToMetersWithUnchangedAxes) {
   for (const char* axis : {"X_UP", "Y_UP", "Z_UP"}) {
     const std::string text = DaeReplaced(kPlate, "Z_UP", axis);
     EXPECT_THAT(ReadDaeText(text).xyz(), ElementsAre(0, 0, 0, 2, 0, 0, 0, 0, 0.5));
@@ -180,7 +180,7 @@ TEST(DaeFile, EachPrimitiveHasItsTriangles) {
               ElementsAre(ElementsAre(0, 1, 2)));
 }
 
-TEST(DaeFile, AllVerticesCountWhetherPrimitivesUseThemOrNot) {
+TEST(DaeFile, UnusedVerticesAreIncluded) {
   const std::string in = kVertex;
   for (const std::string& primitives :
        {std::string(), "<lines count='2'>" + in + "<p>0 1 1 2</p></lines>",

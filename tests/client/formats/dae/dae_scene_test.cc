@@ -173,7 +173,7 @@ TEST(DaeScene, ReferencesMustHaveOneTarget) {
   EXPECT_THAT(
       Error(DaeText("url=\"#scene\"", "url=\"#x\"")),
       HasSubstr("FILE:17: <instance_visual_scene> refers to \"#x\", the ID of no visual_scene"));
-  // A node may have the ID of a geometry; IDs may hold any characters.
+  // A node may have the ID of a geometry; IDs may contain any characters.
   std::string text = DaeText("<node id=\"plate\"", "<node id=\"plate-mesh\"");
   EXPECT_EQ(Error(text), "");
   text = DaeReplaced(text, "id=\"plate-mesh\"", "id=\"&lt;a b&quot;%20\"");
@@ -182,7 +182,7 @@ TEST(DaeScene, ReferencesMustHaveOneTarget) {
   EXPECT_EQ(Error(DaeReplaced(text, "url=\"#plate-mesh\"", "url=\"#%3Ca%20b&quot;\"")), "");
 }
 
-TEST(DaeScene, WhatIsNotReadIsRefusedByName) {
+TEST(DaeScene, UnsupportedElementsAreRefusedByName) {
   EXPECT_THAT(
       Error(Scene("<node><instance_controller url='#skin'/></node>")),
       HasSubstr("FILE:15: <instance_controller> shows a mesh with a skin or morph targets"));
@@ -191,7 +191,7 @@ TEST(DaeScene, WhatIsNotReadIsRefusedByName) {
   EXPECT_THAT(Error(text), HasSubstr("FILE:4: <geometry> is not a <mesh>"));
 }
 
-TEST(DaeScene, NodesThatShowThemselvesAreRefused) {
+TEST(DaeScene, NodesThatInstantiateThemselvesAreRefused) {
   EXPECT_THAT(
       Error(Scene("<node id='a'><instance_node url='#a'/></node>")),
       HasSubstr("FILE:15: <node> is nested deeper than 256 levels; does it instantiate itself?"));
@@ -201,7 +201,7 @@ TEST(DaeScene, NodesThatShowThemselvesAreRefused) {
 }
 
 // 2^30 nodes in a file of 2 KB.
-TEST(DaeScene, NodesThatMultiplyAreRefused) {
+TEST(DaeScene, ExponentiallyManyNodesAreRefused) {
   std::string nodes;
   for (int i = 0; i < 30; ++i) {
     const std::string next = absl::StrCat("<instance_node url='#n", i + 1, "'/>");
@@ -212,7 +212,7 @@ TEST(DaeScene, NodesThatMultiplyAreRefused) {
 }
 
 // 100,000 triangles, 1,000 times.
-TEST(DaeScene, TrianglesThatMultiplyAreRefused) {
+TEST(DaeScene, TooManyInstancesOfTrianglesAreRefused) {
   std::string indices;
   for (int i = 0; i < 100000; ++i) indices += "0 1 2 ";
   std::string nodes = "<node>";

@@ -28,7 +28,7 @@ class FreshnessOptions : public HullctlOnServer {
     return path;
   }
 
-  // Each command that reads.
+  // All commands that read.
   const std::vector<std::vector<std::string>> reads_ = {
       {"get", "cube"},
       {"list"},

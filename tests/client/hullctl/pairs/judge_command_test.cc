@@ -72,7 +72,7 @@ TEST_F(Judge, WrongAnswersComeWorstFirstWithTheirProof) {
   EXPECT_THAT(lines[7], StartsWith("# largest error of a distance 0.25"));
 }
 
-TEST_F(Judge, AProgramThatReportsOnlyCollisionsMayJudgeTouchingEitherWay) {
+TEST_F(Judge, AProgramThatReportsOnlyCollisionsMayReportTouchingEitherWay) {
   const Ran ran = JudgeText(
       "a b b_x colliding\ncube cube 1 1\ncube cube 1 0\ncube cube 0.5 true\ncube cube 2 false\n");
   EXPECT_EQ(ran.code, 1);
@@ -137,7 +137,7 @@ TEST_F(Judge, FindsTheErrorsOfAFloatBoxTestWithAMargin) {
   EXPECT_NEAR(std::stod(reported), largest, 1e-9);
 }
 
-TEST_F(Judge, PairsWithoutAnAnswerFailAlone) {
+TEST_F(Judge, OnlyPairsWithoutAnAnswerFail) {
   const Ran ran = JudgeText("a,b,colliding\ncube,absent,1\ncube,cube,1\n");
   EXPECT_EQ(ran.code, 4);
   EXPECT_THAT(ran.err, HasSubstr("line 2: hull \"absent\" not found"));

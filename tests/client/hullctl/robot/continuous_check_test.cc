@@ -141,7 +141,7 @@ TEST_F(Continuous, AContactAtAWaypointIsFoundThere) {
   EXPECT_THAT(CheckMotion(Swing("1.8"), "hinge\n3\n40\n").out, HasSubstr("# free 1 "));
 }
 
-TEST_F(Continuous, ManyWaypointsGoInSeveralCalls) {
+TEST_F(Continuous, ManyWaypointsAreSentInSeveralCalls) {
   std::string path = "hinge\n";
   for (int i = 0; i < 2500; ++i) path += i % 2 == 0 ? "1.5\n" : "1.25\n";
   path += "-1.25\n1.5\n-1.25\n";

@@ -35,7 +35,7 @@ class HullctlRobot : public HullctlOnServer {
   const TempFile urdf_;
 };
 
-TEST_F(HullctlRobot, OneConfigurationNamesEveryPairWithItsSeparation) {
+TEST_F(HullctlRobot, AConfigurationListsEveryPairWithItsSeparation) {
   Ran ran = Robot({});
   EXPECT_EQ(ran.code, 0) << ran.err;
   EXPECT_THAT(ran.out, HasSubstr("# c: a cylinder within a polyhedron that reaches at most 0.002"));
@@ -82,7 +82,7 @@ TEST_F(HullctlRobot, PrefixKeepsTheHulls) {
   EXPECT_EQ(Robot({"--prefix", "arm/"}).code, 0);
 }
 
-TEST_F(HullctlRobot, ATrajectoryReportsContactsAndTheFirst) {
+TEST_F(HullctlRobot, ATrajectoryReportsContactsAndTheFirstOfThem) {
   const TempFile path("path.csv", "j\n0\n-0.5\n-1.5\n-2\n0\n9\n");
   Ran ran = Robot({"--joints", path.path()});
   EXPECT_EQ(ran.code, 0) << ran.err;
@@ -97,7 +97,7 @@ TEST_F(HullctlRobot, ATrajectoryReportsContactsAndTheFirst) {
 }
 
 // More waypoints than fit in one message.
-TEST_F(HullctlRobot, LongTrajectoriesGoInSeveralMessages) {
+TEST_F(HullctlRobot, LongTrajectoriesAreSentInSeveralMessages) {
   std::string text = "j\n";
   for (int i = 0; i < 5000; ++i) text += i == 4321 ? "-2\n" : "0\n";
   const TempFile path("path.csv", text);

@@ -80,7 +80,7 @@ TEST_F(HullctlScene, ApplyRepairsDifferencesAndPrunes) {
 }
 
 // "cell-3" is a prefix of another cell's names, too.
-TEST_F(HullctlScene, OnlyAPrefixThatEndsAPathOwnsItsIds) {
+TEST_F(HullctlScene, OnlyAPrefixThatEndsWithASlashOwnsItsIds) {
   for (const char* id : {"cell-3/stray", "cell-30/stray", "cell-3stray"}) Put(id, server::Cube());
   const std::string before = Ask({"list", "--output", "name"}).out;
   for (const std::string prefix : {"prefix: cell-3\n", ""}) {
@@ -333,7 +333,7 @@ class SceneUnits : public HullctlOnServer {};
 
 // Each coordinate is rounded only once: 3 in is the double nearest to 0.0762 m, just as the text
 // 0.0762.
-TEST_F(SceneUnits, LengthsOfEveryUnitTouchTheirMeters) {
+TEST_F(SceneUnits, LengthsInEveryUnitEqualTheirMetersExactly) {
   const struct {
     const char* unit;
     const char* length;

@@ -56,7 +56,7 @@ TEST(SceneFile, JsonIsASubsetOfYaml) {
   }
 }
 
-TEST(SceneFile, WithoutPairsAllPairsOfPlacementsAreMeant) {
+TEST(SceneFile, WithoutPairsAllPairsOfPlacementsAreChecked) {
   for (const char* text : {"place: {a: {id: h}, b: {id: h}, c: {id: h}}\n",
                            R"({"placements":[{"hullId":"h"},{"hullId":"h"},{"hullId":"h"}]})"}) {
     const auto scene = Read(text);
@@ -66,7 +66,7 @@ TEST(SceneFile, WithoutPairsAllPairsOfPlacementsAreMeant) {
   }
 }
 
-TEST(SceneFile, TheFormerLineFormatIsRefusedWithItsYaml) {
+TEST(SceneFile, TheFormerLineFormatIsRefusedWithItsYamlEquivalent) {
   const auto refused = [](int line, const std::string& yaml) {
     return "FILE:" + std::to_string(line) +
            ": a scene is YAML, not lines of place and pair; write " + yaml +
@@ -80,7 +80,7 @@ TEST(SceneFile, TheFormerLineFormatIsRefusedWithItsYaml) {
   EXPECT_EQ(Error("all\nplace a h\n"), refused(1, "no \"ask: {pairs: ...}\""));
 }
 
-TEST(SceneFile, JsonIsOneOfThreeMessages) {
+TEST(SceneFile, JsonMayBeAnyOfThreeMessages) {
   const std::string placements = R"({"placements":[{"hullId":"a"},{"hullId":"b"}],)";
   const auto batch = Read(placements + R"("pairs":[1,0],"method":"METHOD_TEXTBOOK_SAT"})");
   ASSERT_TRUE(batch.ok()) << batch.status();

@@ -125,7 +125,7 @@ TEST(Protocol, MalformedMessagesAreRefused) {
   EXPECT_THAT(ErrorOf(R"({"type":"query","tolerance":"much"})"), HasSubstr("not a number"));
 }
 
-TEST(Protocol, FramesHoldHeadDoublesAndIndicesAligned) {
+TEST(Protocol, FramesContainAHeadAndAlignedDoublesAndIndices) {
   HullMesh mesh;
   mesh.header.mutable_hull()->set_revision(42);
   mesh.xyz = {0, 0, 0, 1, 0, 0, 0, 1, 0.1};

@@ -163,7 +163,7 @@ TEST(SimplifyTarget, NonsenseIsRefused) {
   }
 }
 
-TEST(SimplifyTarget, StopsWhenAsked) {
+TEST(SimplifyTarget, StopsOnRequest) {
   const Hull full = HullOf(Sphere(1000, 7));
   int polls = 0;
   const SimplifyTarget target = {500, 0, [&] { return ++polls > 10; }};
@@ -191,7 +191,8 @@ TEST(SimplifyTarget, StopsAtEveryStage) {
   }
 }
 
-// Counts polls, which follow the work. An error that needs nearly all vertices leaves no choice.
+// Counts polls, which are proportional to the work. An error that needs nearly all vertices leaves
+// no choice.
 TEST(SimplifyTarget, OutsideCostsFewTimesInsideForSmallErrors) {
   const Hull full = HullOf(Sphere(2000, 3));
   int polls = 0;

@@ -111,7 +111,7 @@ TEST_F(SurfaceCheck, FindsALinkThatIsNotMutual) {
 
 TEST_F(SurfaceCheck, FindsSwappedLinks) {
   std::swap(Triangle(0).neighbors[0], Triangle(0).neighbors[1]);
-  EXPECT_STREQ(Defect(), "a neighbor does not run along the common edge the other way");
+  EXPECT_STREQ(Defect(), "a neighbor does not traverse the common edge in the opposite direction");
 }
 
 TEST_F(SurfaceCheck, FindsATriangleTurnedInsideOut) {

@@ -85,7 +85,7 @@ std::string FaultOf(const OwnMovingBody& a, const OwnMovingBody& b, const BodyCo
   return next == found.of_body.certificates.size() ? "" : "too many";
 }
 
-TEST(MovingBody, MeetsAsTheEarliestOfItsPieces) {
+TEST(MovingBody, MeetsWhenItsEarliestPieceMeets) {
   Random random(TestSeed(1));
   std::array<int, 4> relations = {};
   int ended_early = 0;
@@ -268,7 +268,7 @@ TEST(MovingBody, TooManyCertificatesAreRefused) {
   EXPECT_EQ(FindFirstContact(a.moving(), b.moving(), options)->of_body.certificates.size(), 9u);
 }
 
-TEST(MovingBody, StopsWhenAsked) {
+TEST(MovingBody, StopsOnRequest) {
   OwnMovingBody a(Translation({0, 0, 0}, {1, 0, 0}));
   a.Add(LatticeCube(2, 1));
   MotionOptions options;

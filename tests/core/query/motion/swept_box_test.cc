@@ -61,7 +61,7 @@ void Check(const MovingBox& a, const MovingBox& b, Counts& counts) {
   counts.needless += expected < 0 && MayMeet(a, b);
 }
 
-// Rays through corners and edges of boxes, along faces, and just beside them, at any scale. Thirds
+// Rays through corners and edges of boxes, along faces, and just next to them, at any scale. Thirds
 // force rounding in every difference.
 TEST(SweptBox, NoPairThatMeetsIsDropped) {
   Random random(TestSeed(1));

@@ -152,7 +152,7 @@ TEST(CenterBounds, CellsDoNotDependOnTheOrderOfTheirCreation) {
   }
 }
 
-TEST(CenterBounds, CellsMayBeComputedAtTheSecondLookWithTheSameResult) {
+TEST(CenterBounds, CellsComputedAtTheSecondUseAreTheSame) {
   Random random(TestSeed(908));
   for (const auto& [name, hull] : Solids(random)) {
     const SupportMap support(hull);

@@ -225,7 +225,7 @@ bool HistoryClient::Append(const std::string& hull_id) {
   operation.sequence = stream->next_sequence;
   operation.if_revision = SomeRevision(hull_id);
   const Coordinates xyz = SomePoints(1 + Below(3), operation);
-  // Occasionally resends a chunk, as a client does that lost an ack.
+  // Occasionally resends a chunk, like a client that lost an ack.
   if (operation.sequence > 1 && Below(8) == 0) --operation.sequence;
   const std::optional<v1::AppendAck> ack =
       stream->appender->Append(operation.sequence, xyz, operation.if_revision);

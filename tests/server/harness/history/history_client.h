@@ -71,7 +71,7 @@ class HistoryClient {
   bool PutBody(const std::string& body_id, const std::vector<std::string>& hulls);
   bool DeleteBody(const std::string& body_id, bool if_known_revision);
   bool GetBody(const std::string& body_id);
-  // Queries if the body touches a point of the cloud.
+  // Queries whether the body touches a point of the cloud.
   bool Ask(const std::string& body_id);
 
   // Issues one random call about all of these, each at the identity pose. IDs of hulls and of
@@ -81,8 +81,8 @@ class HistoryClient {
   // Queries which of some points of the cloud each touches.
   bool Batch(const std::vector<std::string>& hulls, const std::vector<std::string>& bodies);
   bool Scene(const std::vector<std::string>& hulls, const std::vector<std::string>& bodies);
-  // As Scene, by a collision stream, which is opened if none is open. An open stream resolves the
-  // hulls again, and sometimes moves a point.
+  // Like Scene, but by a collision stream, which is opened if none is open. An open stream resolves
+  // the hulls again, and sometimes moves a point.
   bool AskStream(const std::vector<std::string>& hulls, const std::vector<std::string>& bodies);
   // Lists in one page or in single-item pages. Requires: no other IDs have their prefix.
   bool ListHulls(const std::vector<std::string>& hulls);
@@ -107,7 +107,7 @@ class HistoryClient {
   Coordinates SomePoints(int count, Operation& operation);
   // Sets the same random freshness in the request and the operation.
   void ChooseFreshness(Operation& operation, v1::Freshness& freshness);
-  // As ChooseFreshness, for queries about several hulls; half of them are linearizable.
+  // Like ChooseFreshness, but for queries about several hulls; half of them are linearizable.
   void ChooseFreshnessOfSeveral(Operation& operation, v1::Freshness& freshness);
   // Records an answer about several hulls, received now.
   void RecordSeveral(Operation operation, const v1::ResponseHeader& header, std::vector<Seen> seen);

@@ -265,7 +265,7 @@ class OrderSearch {
     return true;
   }
 
-  // Applies an operation to `state`. Returns false if the hulls may not answer so.
+  // Applies an operation to `state`. Returns false if the specification forbids the answer.
   bool StepAll(State& state, const Placed& operation) const {
     if (!IsJoint(operation)) return Step(state[operation.hull], operation);
     return StepJoint(

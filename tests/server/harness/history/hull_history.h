@@ -154,15 +154,15 @@ class HullHistory {
 // the requested bound, before its answer, and after every change up to the requested revision. In
 // any case an answer contains every change up to the store revision that it names.
 //
-// All hulls share the store's revision, so that of a change is taken from the answer and must
-// exceed all before. The search remembers visited states; a read that fits and adds no information
-// is taken immediately. Source: Wing and Gong 1993, Testing and Verifying Concurrent Objects; Lowe
-// 2017, Testing for Linearizability.
+// All hulls share the store's revisions, so the revision of a change is taken from the answer and
+// must exceed all earlier ones. The search remembers visited states; a read that fits and adds no
+// information is taken immediately. Source: Wing and Gong 1993, Testing and Verifying Concurrent
+// Objects; Lowe 2017, Testing for Linearizability.
 std::string LinearizabilityFault(std::vector<Operation> operations);
 
-// As LinearizabilityFault, for several hulls and bodies by ID. One order must explain all of them,
-// so that both hulls of a pair, or a body and the hulls of its pieces, had the answered states at
-// one instant. Changes to one store follow the order of its revisions.
+// Like LinearizabilityFault, but for several hulls and bodies by ID. One order must explain all of
+// them, so that both hulls of a pair, or a body and the hulls of its pieces, had the answered
+// states at one instant. Changes to one store follow the order of its revisions.
 std::string JointLinearizabilityFault(
     const std::map<std::string, std::vector<Operation>>& operations);
 

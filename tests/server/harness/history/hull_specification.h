@@ -43,8 +43,8 @@ struct SpecifiedHull {
 // Applies an operation to `hull`. Returns false if the specification forbids its answer. Not for
 // pairs, batches, or queries about a body.
 bool Step(SpecifiedHull& hull, const Operation& operation);
-// As Step, for joint operations. `find` returns the other hulls that the operation names and the
-// hulls of the body's pieces, by ID.
+// Like Step, but for joint operations. `find` returns the other hulls that the operation names and
+// the hulls of the body's pieces, by ID.
 using FindSpecified = std::function<SpecifiedHull&(const std::string& hull_id)>;
 bool StepJoint(SpecifiedHull& hull, const Operation& operation, const FindSpecified& find);
 // Returns true if the operation never changes state.

@@ -25,7 +25,7 @@ class CuttingProxy {
     kAfterCommit,
     // Cuts the connection to hulld, and holds the piece that contains BEGIN until Deliver.
     kHold,
-    // As kHold, for the piece that contains COMMIT and no BEGIN.
+    // Like kHold, but for the piece that contains COMMIT and no BEGIN.
     kHoldCommit,
   };
 
@@ -46,7 +46,7 @@ class CuttingProxy {
   // Cuts so far.
   int cuts();
   // CutListeners cuts the current connections that issued LISTEN. SetDeaf withholds everything the
-  // server sends to them, as a network does that silently lost a connection.
+  // server sends to them, like a network that silently lost a connection.
   void CutListeners();
   void SetDeaf(bool deaf);
   // Delays every piece of the server's answers.

@@ -66,8 +66,8 @@ class ManyServersTest : public ::testing::Test {
   // client continues once a server answers a read. The faults occur in order, evenly spread over
   // the calls. Finally queries every server about every hull.
   void Run(const Calls& calls, const std::vector<Fault>& faults, HullHistory& history);
-  // Expects that a change gets no answer for a while because the database is unreachable. The
-  // change creates a hull outside of any history.
+  // Expects a change to get no answer for a while, because the database is unreachable. The change
+  // creates a hull outside of any history.
   void ExpectNoAnswer(size_t server, const std::string& hull_id = "unanswered");
   // Expects a linearizable history; on failure reports the seed and the servers' logs.
   void ExpectLinearizable(const HullHistory& history, uint64_t seed);

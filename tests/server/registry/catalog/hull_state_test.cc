@@ -194,7 +194,7 @@ TEST(HullStateDeathTest, OnlyAQuietHullEnds) {
   EXPECT_DEATH(Gone().StartEnding(), "check failed");
 }
 
-TEST(HullStateDeathTest, NothingComesBackThatWasNotStarted) {
+TEST(HullStateDeathTest, OnlyStartedWorkIsReturned) {
   EXPECT_DEATH(HullState::Present().EndWork(), "check failed");
   EXPECT_DEATH(HullState::Present().Commit(), "check failed");
   EXPECT_DEATH(HullState::Present().Refuse(), "check failed");

@@ -61,7 +61,7 @@ class HullTableTest : public ::testing::Test {
   HullTable table_{true, budget_};
 };
 
-TEST_F(HullTableTest, AHullComesBackFromRestAsItWas) {
+TEST_F(HullTableTest, AHullReturnsFromRestUnchanged) {
   const StoredHull stored = Stored("a", 7);
   table_.AddResting(stored);
   EXPECT_FALSE(IsAwake("a"));
@@ -132,14 +132,14 @@ TEST_F(HullTableTest, DamagedHullsStayMarkedAsDamaged) {
   EXPECT_TRUE(table_.Find("x")->state.damaged());
 }
 
-TEST_F(HullTableTest, TheHandGoesRoundAnyNumberOfHulls) {
+TEST_F(HullTableTest, TheClockHandVisitsAnyNumberOfHulls) {
   for (int i = 0; i < 37; ++i) table_.AddResting(Stored("h" + std::to_string(i), i + 1));
   for (int i = 0; i < 37; ++i) ASSERT_NE(table_.Find("h" + std::to_string(i)), nullptr);
   for (size_t step = 0; step <= 37 / HullTable::kHullsPerStep + 1; ++step) table_.RestSome(locked_);
   for (int i = 0; i < 37; ++i) EXPECT_FALSE(IsAwake("h" + std::to_string(i))) << i;
 }
 
-TEST_F(HullTableTest, AnIdleSmallHullTakesItsPointsAlone) {
+TEST_F(HullTableTest, AnIdleSmallHullKeepsOnlyItsPoints) {
   Cube("a");
   RestIdle(locked_, table_);
   EXPECT_TRUE(IsAwake("a")) << "looked up since the last visit";

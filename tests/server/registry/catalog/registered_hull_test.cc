@@ -86,7 +86,7 @@ TEST_F(SupersededHull, GrowthIsAddedAndReadersKeepTheirSnapshots) {
   EXPECT_EQ(hull_.points_since_prepared(), 1);
 }
 
-TEST_F(SupersededHull, WithoutGrowthItGoes) {
+TEST_F(SupersededHull, WithoutGrowthItIsDropped) {
   EXPECT_FALSE(Supersede(Grown(), nullptr));
   EXPECT_EQ(hull_.committed(), Grown());
   EXPECT_FALSE(hull_.IsReady());
@@ -96,7 +96,7 @@ TEST_F(SupersededHull, WithoutGrowthItGoes) {
   EXPECT_FALSE(hull_.IsReady());
 }
 
-TEST_F(SupersededHull, WhereNoVertexCameAllStays) {
+TEST_F(SupersededHull, WithoutNewVerticesEverythingIsKept) {
   hull_.SetBuilder(std::make_unique<HullBuilder>());
   StoredHull counted = Cube();
   counted.record.counts.received = 1;

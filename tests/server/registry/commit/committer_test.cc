@@ -359,7 +359,7 @@ TEST(Committer, ConflictingChangesAreRefusedAndTheRestIsKept) {
 }
 
 // A change that may have been committed returns as a peer change: it was not superseded.
-TEST(Committer, ABatchWithoutAKnownOutcomeIsRefusedBeforeAnybodyLooks) {
+TEST(Committer, ABatchOfUnknownOutcomeIsRefusedBeforePeerChangesAreReported) {
   SharedStore store;
   FairMutex order;
   std::vector<std::string> events;

@@ -65,7 +65,7 @@ TEST_F(MemoryBudgetTest, CountsAccountsAndCharges) {
   EXPECT_EQ(bytes(), 0);
 }
 
-TEST_F(MemoryBudgetTest, NoAccountLetsGoWithinTheLimit) {
+TEST_F(MemoryBudgetTest, NothingIsEvictedWithinTheLimit) {
   Owner owner(*this, 1);
   owner.account.Set(100, false);
   Evict();
@@ -73,7 +73,7 @@ TEST_F(MemoryBudgetTest, NoAccountLetsGoWithinTheLimit) {
   EXPECT_THAT(asked_, ElementsAre());
 }
 
-TEST_F(MemoryBudgetTest, TheOneNotUsedForLongestGoesFirstAndNoMoreThanNeeded) {
+TEST_F(MemoryBudgetTest, TheLeastRecentlyUsedIsEvictedFirstAndNoMoreThanNeeded) {
   Owner a(*this, 1);
   Owner b(*this, 2);
   Owner c(*this, 3);
@@ -85,7 +85,7 @@ TEST_F(MemoryBudgetTest, TheOneNotUsedForLongestGoesFirstAndNoMoreThanNeeded) {
   EXPECT_EQ(budget_.Statistics().evictions, 1);
 }
 
-TEST_F(MemoryBudgetTest, ItemsInUseStayAndAreAskedAgain) {
+TEST_F(MemoryBudgetTest, ItemsInUseStayAndAreTriedAgain) {
   Owner busy(*this, 1, 60);
   Owner idle(*this, 2);
   busy.account.Set(60, false);
@@ -106,7 +106,7 @@ TEST_F(MemoryBudgetTest, ItemsInUseStayAndAreAskedAgain) {
 }
 
 // An owner that cannot evict is asked again only after all others; one eviction asks only a few.
-TEST_F(MemoryBudgetTest, OneEvictionAsksABoundedNumber) {
+TEST_F(MemoryBudgetTest, AnEvictionTriesABoundedNumber) {
   std::vector<std::unique_ptr<Owner>> owners;
   for (int i = 0; i < 200; ++i) {
     owners.push_back(std::make_unique<Owner>(*this, i, i < 150 ? 1 : 0));
@@ -120,7 +120,7 @@ TEST_F(MemoryBudgetTest, OneEvictionAsksABoundedNumber) {
   EXPECT_EQ(bytes(), 200);
 }
 
-TEST_F(MemoryBudgetTest, EachUseHasAShareOfItsOwn) {
+TEST_F(MemoryBudgetTest, EachUseHasItsOwnShare) {
   MemoryCharge writing(budget_, MemoryUse::kWriting, 60);
   MemoryCharge reading(budget_, MemoryUse::kReading, 40);
   EXPECT_TRUE(Check(MemoryUse::kWriting).ok());
@@ -137,7 +137,7 @@ TEST_F(MemoryBudgetTest, EachUseHasAShareOfItsOwn) {
   EXPECT_THAT(std::string(Check(MemoryUse::kReading).message()), HasSubstr("readers use 41 bytes"));
 }
 
-TEST_F(MemoryBudgetTest, APartIsHeldForReadersWhileOneHoldsIt) {
+TEST_F(MemoryBudgetTest, APartCountsForReadersWhileAReaderHoldsIt) {
   Owner owner(*this, 1);
   const auto part = std::make_shared<MemoryPart>(budget_, &owner, 30);
   EXPECT_EQ(bytes(), 0);

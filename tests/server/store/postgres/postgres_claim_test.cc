@@ -166,7 +166,7 @@ TEST_F(PostgresClaim, AWrongPasswordIsReportedAndNotShown) {
   EXPECT_THAT(log.text(), Not(HasSubstr("falsches-Wort")));
 }
 
-TEST_F(PostgresClaim, ARoleWithoutRightsIsToldTheMissingGrant) {
+TEST_F(PostgresClaim, ARoleWithoutRightsGetsAnErrorThatNamesTheGrant) {
   Ask("CREATE ROLE stranger LOGIN PASSWORD 'fremd'");
   options_.conninfo = absl::StrCat("host=", proxy_->directory(), " dbname=", database_,
                                    " user=stranger password=fremd");

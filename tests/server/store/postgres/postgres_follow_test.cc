@@ -83,7 +83,7 @@ Vector PointOutside(int i) {
   return (1.1 + 0.001 * i) * Vector(std::cos(angle), std::sin(angle), 0.01 * i);
 }
 
-TEST_F(PostgresFollow, ApplyingPeerChangesCostsAsMuchAsTheirSize) {
+TEST_F(PostgresFollow, TheCostOfPeerChangesFollowsTheirSize) {
   FollowWhenCalled();
   constexpr int kAppends = 20;
   uint64_t bytes_of_the_smallest = 0;

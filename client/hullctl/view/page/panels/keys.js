@@ -18,7 +18,7 @@ export function bindKeys(actions) {
     [['Backspace'], '', 'return the object to its original pose', actions.reset],
     [['.'], '', 'play the timeline', actions.play],
     [[','], '', 'go to the first contact of a motion', actions.contact],
-    [['U'], '', 'undo the last motion; also Ctrl+Z', actions.undo],
+    [['U'], '', 'undo the last move; also Ctrl+Z', actions.undo],
     [['\u2190', '\u2191', '\u2193', '\u2192'], ' ', 'orbit; with Shift pan', null],
     [['+', '\u2212'], ' ', 'zoom', null],
     [['I'], '', 'isometric view', () => actions.view('isometric')],

@@ -1,5 +1,5 @@
 // A timeline under the picture: a slider with marks, and a button that plays it. A track defines
-// its meaning.
+// what the timeline shows.
 
 // Merges ascending moments into runs [first, last].
 export function runsOf(moments) {

@@ -249,7 +249,7 @@ export function checkExactly(relation, certificate, a, b) {
   }
   require(
       gapSign(a, b, readDirection(certificate).n) >= 0n,
-      'the direction does not keep the insides apart: max n.A > min n.B');
+      'the direction does not separate the interiors: max n.A > min n.B');
   require(
       holdsOriginOnBoundary(points),
       'the vertex pairs show no common point: 0 is not in the hull of their differences');

@@ -206,7 +206,7 @@ TEST_F(BridgeTest, RequestsBeyondTheLimitsAreDropped) {
   EXPECT_EQ(socket.ReadAll(), "");
 }
 
-TEST_F(BridgeTest, IdleConnectionsMakeRoomForThePage) {
+TEST_F(BridgeTest, IdleConnectionsAreClosedInFavorOfThePage) {
   BridgeOptions options;
   options.max_connections = 2;
   Start(std::move(options));
