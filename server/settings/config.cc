@@ -73,31 +73,15 @@ std::string Hint(const std::string& word, const std::vector<std::string>& known,
   return nearest.empty() ? "" : absl::StrCat("; did you mean ", prefix, nearest, "?");
 }
 
-struct SizeUnit {
-  const char* name;
-  uint64_t bytes;
-};
-constexpr SizeUnit kSizeUnits[] = {{"", 1},
-                                   {"B", 1},
-                                   {"kB", 1000},
-                                   {"MB", 1000 * 1000},
-                                   {"GB", 1000 * 1000 * 1000},
-                                   {"KiB", 1 << 10},
-                                   {"MiB", 1 << 20},
-                                   {"GiB", 1 << 30}};
-
 // Parses a size such as "512MiB" into bytes.
-std::optional<uint64_t> ParseSize(const std::string& text) {
-  uint64_t number = 0;
-  const char* const end = text.data() + text.size();
-  const auto [parsed, error] = std::from_chars(text.data(), end, number);
-  if (error != std::errc()) return std::nullopt;
-  for (const SizeUnit& unit : kSizeUnits) {
-    if (std::string(parsed, end) != unit.name) continue;
-    if (number > kAnyNumber / unit.bytes) return std::nullopt;
-    return number * unit.bytes;
+std::optional<uint64_t> ParseSize(std::string text) {
+  try {
+    uint64_t bytes = 0;
+    CLI::AsSizeValue(/*kb_is_1000=*/true)(text);
+    return absl::SimpleAtoi(text, &bytes) ? std::optional(bytes) : std::nullopt;
+  } catch (const CLI::ValidationError&) {
+    return std::nullopt;
   }
-  return std::nullopt;
 }
 
 // Wraps descriptions, so that lines have at most 100 columns.
