@@ -4,7 +4,6 @@
 #include <grpc/grpc_security.h>
 #include <grpcpp/security/server_credentials.h>
 
-#include <cstdint>
 #include <memory>
 #include <mutex>
 #include <string>

@@ -12,7 +12,6 @@
 
 #include <ctime>
 #include <memory>
-#include <utility>
 #include <vector>
 
 #include "core/base/status_macros.h"

@@ -14,7 +14,6 @@
 #include "core/hull/growth/hull_builder.h"
 #include "server/process/log.h"
 #include "server/registry/memory/hull_loader.h"
-#include "server/settings/config.h"
 #include "server/store/rocksdb_store.h"
 
 namespace hulld::server {

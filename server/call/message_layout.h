@@ -4,7 +4,6 @@
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/io/coded_stream.h>
 
-#include <cstddef>
 #include <cstdint>
 #include <string_view>
 #include <vector>

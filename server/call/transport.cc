@@ -3,7 +3,6 @@
 #include <grpcpp/resource_quota.h>
 
 #include <algorithm>
-#include <cstddef>
 
 namespace hulld::server {
 namespace {

@@ -6,15 +6,12 @@
 #include <prometheus/counter.h>
 
 #include <condition_variable>
-#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <set>
-#include <string>
 #include <thread>
-#include <utility>
 #include <vector>
 
 #include "server/network/connection_table.h"

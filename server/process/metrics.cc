@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "core/base/check.h"
-#include "server/contract/errors.h"
 #include "server/process/descriptors.h"
 #include "server/process/heap.h"
 

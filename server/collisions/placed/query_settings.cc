@@ -7,7 +7,6 @@
 #include "core/base/status_macros.h"
 #include "core/query/body/body_search.h"
 #include "server/contract/errors.h"
-#include "server/wire/decode.h"
 
 namespace hulld::server {
 namespace {

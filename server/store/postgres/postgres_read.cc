@@ -8,7 +8,6 @@
 
 #include "core/base/status_macros.h"
 #include "server/store/postgres/postgres_store.h"
-#include "server/store/store_errors.h"
 #include "server/store/store_keys.h"
 
 namespace hulld::server {
