@@ -98,7 +98,7 @@ class WatchStream : public RequestStream<PulledStream<WriteReactor, v1::WatchHul
           "after_revision requires store_id; use the one from the same header");
     }
     HULLD_RETURN_IF_ERROR(
-        parts_.registry.barrier().AwaitPeers([this] { return call().ShouldStop(); }));
+        parts_.registry.peers().AwaitPeers([this] { return call().ShouldStop(); }));
     HULLD_ASSIGN_OR_RETURN(watch_, parts_.registry.feed().Open(
                                        target, {request().after_revision(), request().store_id()},
                                        [this, self = shared_from_this()] { SendNext(); }));

@@ -18,13 +18,13 @@ Registry::Registry(Store& store, const Limits& limits, TaskPool& writers,
     : state_(store, limits, preparers),
       committer_(store, state_.mutex),
       loaders_(std::in_place, std::max(1, DefaultThreads() - 1), loaders),
-      barrier_(state_, committer_),
-      records_(state_, committer_, barrier_, *loaders_),
-      reader_(state_, barrier_, records_, *loaders_),
-      changes_(state_, committer_, barrier_, records_, writers) {}
+      peers_(state_, committer_),
+      records_(state_, committer_, peers_, *loaders_),
+      reader_(state_, peers_, records_, *loaders_),
+      changes_(state_, committer_, peers_, records_, writers) {}
 
 Registry::~Registry() {
-  barrier_.End();
+  peers_.End();
   state_.EndPreparing();
   // Its thread applies peer changes to the parts that are destroyed below.
   committer_.End();
@@ -55,7 +55,7 @@ absl::Status Registry::Load() {
           state_.AddStoredBody(locked, id, body);
         }));
   }
-  return barrier_.Begin(locked, {&changes_, &records_});
+  return peers_.Begin(locked, {&changes_, &records_});
 }
 
 absl::StatusOr<Resolved> Registry::Resolve(std::span<const std::string> ids,

@@ -18,7 +18,7 @@
 #include "server/registry/commit/committer.h"
 #include "server/registry/memory/locked.h"
 #include "server/registry/memory/memory_budget.h"
-#include "server/registry/peers/read_barrier.h"
+#include "server/registry/peers/peer_sync.h"
 #include "server/registry/read/hull_reader.h"
 #include "server/registry/records/record_reader.h"
 #include "server/registry/state/registry_state.h"
@@ -34,8 +34,8 @@ namespace hulld::server {
 //   RegistryState  the state that the parts share, and the only functions that apply a committed
 //                  change to it
 //   Committer      commits changes to the store in batches, in the order of submission
-//   ReadBarrier    blocks a call until the registry satisfies its freshness; applies the changes of
-//                  peer servers, if there are any
+//   PeerSync       applies the commits of peer servers, if there are any; blocks a call until the
+//                  registry satisfies its freshness
 //   RecordReader   finds bodies; loads and lists records if the store finds records
 //   LocalChanges   creates, deletes, replaces, and grows hulls and bodies
 //   HullReader     serves hulls of a single snapshot
@@ -99,9 +99,9 @@ class Registry {
   HullReader& reader() { return reader_; }
   // Waits for freshness. Required before functions without a freshness parameter: those of
   // records().
-  ReadBarrier& barrier() { return barrier_; }
+  PeerSync& peers() { return peers_; }
   // True if peer servers commit to the same store, so that reads may wait for their changes.
-  bool has_peers() const { return barrier_.has_peers(); }
+  bool has_peers() const { return peers_.has_peers(); }
   // False if no body exists. Takes no lock.
   bool has_bodies() const { return state_.BodyCount() > 0; }
 
@@ -144,7 +144,7 @@ class Registry {
   Committer committer_;
   // Threads that read records, and help readers that load many hulls.
   std::optional<TaskPool> loaders_;
-  ReadBarrier barrier_;
+  PeerSync peers_;
   RecordReader records_;
   HullReader reader_;
   LocalChanges changes_;

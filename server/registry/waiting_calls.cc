@@ -59,10 +59,10 @@ std::shared_ptr<WaitingCalls::Wait> WaitingCalls::Add(
 bool WaitingCalls::AwaitFresh(Registry& registry, const Freshness& freshness,
                               std::function<bool()> should_stop,
                               std::function<void(const absl::Status&)> done) {
-  ReadBarrier& barrier = registry.barrier();
-  if (!registry.has_peers() || barrier.TryFresh(freshness).has_value()) return false;
+  PeerSync& peers = registry.peers();
+  if (!registry.has_peers() || peers.TryFresh(freshness).has_value()) return false;
   const std::shared_ptr<Wait> wait = Add(std::move(should_stop), std::move(done));
-  barrier.StartFetch([wait](const absl::Status& status) { wait->Finish(status); });
+  peers.StartFetch([wait](const absl::Status& status) { wait->Finish(status); });
   return true;
 }
 

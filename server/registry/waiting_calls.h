@@ -53,7 +53,7 @@ class WaitingCalls {
                             std::function<void(const absl::Status&)> done);
 
   // Calls `done` as above when the registry satisfies `freshness`. Returns false and does nothing
-  // if it already does. Cost: as ReadBarrier::StartFetch.
+  // if it already does. Cost: as PeerSync::StartFetch.
   bool AwaitFresh(Registry& registry, const Freshness& freshness, std::function<bool()> should_stop,
                   std::function<void(const absl::Status&)> done);
 

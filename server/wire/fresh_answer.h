@@ -34,12 +34,12 @@ void EndFresh(Registry& registry, TaskPool& pool, UnaryCall* call, Answer answer
       DecodeFreshness(call->request().freshness(), registry.store(), call->call().arrival());
   if (!freshness.ok()) return call->End(freshness.status());
   if (is_quick) {
-    if (const auto staleness = registry.barrier().TryFresh(*freshness))
+    if (const auto staleness = registry.peers().TryFresh(*freshness))
       return call->End(answer(*staleness));
   }
   call->EndOn(pool, [&registry, call, freshness = *freshness, answer = std::move(answer)] {
     const absl::StatusOr<std::chrono::nanoseconds> staleness =
-        registry.barrier().AwaitFresh(freshness, [call] { return call->call().ShouldStop(); });
+        registry.peers().AwaitFresh(freshness, [call] { return call->call().ShouldStop(); });
     return staleness.ok() ? answer(*staleness) : staleness.status();
   });
 }

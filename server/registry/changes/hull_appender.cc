@@ -163,7 +163,7 @@ absl::StatusOr<uint64_t> LocalChanges::CommittedSequence(Locked& locked, Registe
   locked.Lock();
   hull.EndReadingSequence();
   if (absl::IsAborted(sequence.status())) {
-    HULLD_RETURN_IF_ERROR(barrier_.AwaitPeers(locked, {}));
+    HULLD_RETURN_IF_ERROR(peers_.AwaitPeers(locked, {}));
     // Every caller checks for this.
     if (hull.state.gone()) return 0;
     if (hull.supersessions() == supersessions && hull.committed().record == record) {
@@ -235,8 +235,8 @@ void LocalChanges::ApplyChunk(Locked& locked, const HullPointer& hull, PendingCh
   const uint64_t sequence = pending.chunk.sequence;
   absl::StatusOr<bool> is_new = CheckChunk(locked, *hull, pending);
   // Without a commit, no store write detects a stale state, so compare explicitly.
-  if (!is_new.value_or(false) && barrier_.has_peers()) {
-    const absl::Status fresh = barrier_.AwaitPeers(locked, pending.should_stop);
+  if (!is_new.value_or(false) && peers_.has_peers()) {
+    const absl::Status fresh = peers_.AwaitPeers(locked, pending.should_stop);
     is_new = fresh.ok() ? CheckChunk(locked, *hull, pending) : fresh;
     // An earlier chunk must be rebuilt first.
     if (hull->IsQueuedBefore(pending)) {
@@ -313,14 +313,14 @@ absl::StatusOr<LocalChanges::BuiltChunk> LocalChanges::Build(Locked& locked, Reg
 
   locked.Unlock();
   const absl::StatusOr<PointCounts> added = AddPoints(pending, lent, **live, built);
-  if (!barrier_.has_peers()) pending.chunk.points = {};
+  if (!peers_.has_peers()) pending.chunk.points = {};
   const uint64_t builder_bytes = lent.builder == nullptr ? 0 : lent.builder->MemoryBytes();
   locked.Lock();
 
   hull.ReturnBuilder(std::move(lent.builder), builder_bytes);
   if (hull.state.work() == HullState::Work::kReverting) {
     hull.DiscardBuilder(locked);
-    if (barrier_.has_peers()) return Superseded();
+    if (peers_.has_peers()) return Superseded();
     return absl::UnavailableError("an earlier change could not be stored");
   }
   if (!added.ok()) return WhyNotBuilt(hull, added.status());
@@ -349,7 +349,7 @@ absl::StatusOr<std::shared_ptr<LiveHull>> LocalChanges::LiveForWriter(Locked& lo
   absl::StatusOr<std::shared_ptr<LiveHull>> loaded = LoadLive(state_.store, stored);
   locked.Lock();
   if (absl::IsAborted(loaded.status())) {
-    HULLD_RETURN_IF_ERROR(barrier_.AwaitPeers(locked, {}));
+    HULLD_RETURN_IF_ERROR(peers_.AwaitPeers(locked, {}));
     const bool is_known = hull.state.work() == HullState::Work::kReverting || hull.state.gone() ||
                           hull.state.changing_life();
     return is_known ? Superseded() : StoreDisagrees(stored.record);
@@ -415,7 +415,7 @@ void LocalChanges::SubmitChunk(Locked& locked, const HullPointer& hull, PendingC
   std::shared_ptr<PendingChunk> kept;
   const Reply<ChunkResult> done = pending.done;
   const WriterSequence writer = *built.change.writer;
-  if (barrier_.has_peers()) {
+  if (peers_.has_peers()) {
     kept = std::make_shared<PendingChunk>(std::move(pending));
     // NOLINTNEXTLINE(bugprone-use-after-move): it is the caller's again
     pending.on_built = std::exchange(kept->on_built, nullptr);

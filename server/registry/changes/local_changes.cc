@@ -256,7 +256,7 @@ void LocalChanges::SubmitBody(Locked& locked, Change change, Committer::Completi
                       if (entry.committed() == nullptr) state_.EraseBody(later, id);
                       for (LockedTask& next : waiting) {
                         // The peer change must be applied first.
-                        Committer::IsSuperseded(status) ? barrier_.Defer(std::move(next))
+                        Committer::IsSuperseded(status) ? peers_.Defer(std::move(next))
                                                         : next(later);
                       }
                       state_.bodies.DropSome(later);
@@ -278,7 +278,7 @@ void LocalChanges::Submit(Locked& locked, const HullPointer& hull, Change change
                       finish(later, status, committed);
                       // The peer change must be applied first.
                       if (Committer::IsSuperseded(status)) {
-                        return barrier_.Defer([this, hull](Locked& next) { Advance(next, hull); });
+                        return peers_.Defer([this, hull](Locked& next) { Advance(next, hull); });
                       }
                       // A hull at rest may be evicted.
                       if (hull->state.quiet() && !hull->state.gone()) {
@@ -318,7 +318,7 @@ void LocalChanges::Advance(Locked& locked, const HullPointer& hull) {
 
 void LocalChanges::OnPeerChange(Locked& /*locked*/, const std::string& /*id*/,
                                 const HullPointer& hull) {
-  if (hull != nullptr) barrier_.Defer([this, hull](Locked& later) { Advance(later, hull); });
+  if (hull != nullptr) peers_.Defer([this, hull](Locked& later) { Advance(later, hull); });
 }
 
 }  // namespace hulld::server

@@ -16,7 +16,7 @@
 #include "server/registry/catalog/registry_types.h"
 #include "server/registry/commit/committer.h"
 #include "server/registry/memory/locked.h"
-#include "server/registry/peers/read_barrier.h"
+#include "server/registry/peers/peer_sync.h"
 #include "server/registry/records/record_reader.h"
 #include "server/registry/state/registry_state.h"
 #include "server/store/records.h"
@@ -54,13 +54,9 @@ struct PendingChunk;
 class LocalChanges : public PeerChangeListener {
  public:
   // All must outlive this. Chunks are built on `writers`.
-  LocalChanges(RegistryState& state, Committer& committer, ReadBarrier& barrier,
-               RecordReader& records, TaskPool& writers)
-      : state_(state),
-        committer_(committer),
-        barrier_(barrier),
-        records_(records),
-        writers_(writers) {}
+  LocalChanges(RegistryState& state, Committer& committer, PeerSync& peers, RecordReader& records,
+               TaskPool& writers)
+      : state_(state), committer_(committer), peers_(peers), records_(records), writers_(writers) {}
   LocalChanges(const LocalChanges&) = delete;
   LocalChanges& operator=(const LocalChanges&) = delete;
 
@@ -150,7 +146,7 @@ class LocalChanges : public PeerChangeListener {
 
   RegistryState& state_;
   Committer& committer_;
-  ReadBarrier& barrier_;
+  PeerSync& peers_;
   RecordReader& records_;
   TaskPool& writers_;
   // Key of the newest session in RegisteredHull::watches. Guarded by the registry's mutex.

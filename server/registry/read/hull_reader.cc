@@ -256,10 +256,10 @@ absl::StatusOr<Resolved> HullReader::Refresh(std::span<const std::string> ids, K
   {
     Locked locked(state_.mutex);
     absl::StatusOr<std::chrono::nanoseconds> staleness = WouldWait();
-    if (const auto known_staleness = barrier_.TryFresh(locked, plan.freshness)) {
+    if (const auto known_staleness = peers_.TryFresh(locked, plan.freshness)) {
       staleness = *known_staleness;
     } else if (plan.may_wait) {
-      staleness = barrier_.AwaitFresh(locked, plan.freshness, should_stop);
+      staleness = peers_.AwaitFresh(locked, plan.freshness, should_stop);
     }
     if (!staleness.ok()) return staleness.status();
     resolved.as_of.staleness = *staleness;
@@ -322,7 +322,7 @@ absl::Status HullReader::LoadOne(Locked& locked, RegisteredHull& hull,
     locked.Lock();
     hull.EndLoading();
     if (absl::IsAborted(loaded.status())) {
-      HULLD_RETURN_IF_ERROR(barrier_.AwaitPeers(locked, should_stop));
+      HULLD_RETURN_IF_ERROR(peers_.AwaitPeers(locked, should_stop));
       const HullRecord& now = hull.committed().record;
       if (!hull.state.gone() && now.revision == stored.record.revision) return StoreDisagrees(now);
       continue;

@@ -14,7 +14,7 @@
 #include "server/registry/catalog/known_hulls.h"
 #include "server/registry/catalog/registry_types.h"
 #include "server/registry/memory/locked.h"
-#include "server/registry/peers/read_barrier.h"
+#include "server/registry/peers/peer_sync.h"
 #include "server/registry/records/record_reader.h"
 #include "server/registry/state/registry_state.h"
 
@@ -37,8 +37,8 @@ namespace hulld::server {
 class HullReader {
  public:
   // All must outlive this. loaders: threads that help readers of many hulls.
-  HullReader(RegistryState& state, ReadBarrier& barrier, RecordReader& records, TaskPool& loaders)
-      : state_(state), barrier_(barrier), records_(records), loaders_(loaders) {}
+  HullReader(RegistryState& state, PeerSync& peers, RecordReader& records, TaskPool& loaders)
+      : state_(state), peers_(peers), records_(records), loaders_(loaders) {}
   HullReader(const HullReader&) = delete;
   HullReader& operator=(const HullReader&) = delete;
 
@@ -76,7 +76,7 @@ class HullReader {
                        const std::function<bool()>& should_stop);
 
   RegistryState& state_;
-  ReadBarrier& barrier_;
+  PeerSync& peers_;
   RecordReader& records_;
   TaskPool& loaders_;
   // May be null.

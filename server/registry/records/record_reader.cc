@@ -56,13 +56,13 @@ void RecordReader::WhenKnown(const std::string& id, Committer::Barrier done) {
 void RecordReader::WhenReady(const std::string& id, For need, Refusal refuse, Task task) {
   const auto ready =
       std::make_shared<const ReadyTask>(ReadyTask{id, need, std::move(refuse), std::move(task)});
-  barrier_.WhenFresh(ready->refuse, [this, ready](Locked& locked) { RunWhenReady(locked, ready); });
+  peers_.WhenFresh(ready->refuse, [this, ready](Locked& locked) { RunWhenReady(locked, ready); });
 }
 
 void RecordReader::RunWhenReady(Locked& locked, const std::shared_ptr<const ReadyTask>& ready) {
   const LockedTask again = [this, ready](Locked& later) { RunWhenReady(later, ready); };
   const std::string& id = ready->id;
-  if (!state_.IsKnown(id)) return WhenKnown(id, ReadBarrier::RunOrRefuse(ready->refuse, again));
+  if (!state_.IsKnown(id)) return WhenKnown(id, PeerSync::RunOrRefuse(ready->refuse, again));
   BodyTable::Entry* const body = state_.bodies.Find(id);
   if (body != nullptr && body->in_flight) return body->waiting.push_back(again);
   if (const HullPointer hull = state_.Find(id); hull != nullptr) {
@@ -204,7 +204,7 @@ void RecordReader::OnPeerChange(Locked& /*locked*/, const std::string& id,
   if (found == readings_.end()) return;
   if (!state_.IsKnown(id)) state_.hulls.NoteAbsent(id);
   for (Committer::Barrier& done : found->second->waiting) {
-    barrier_.Defer([done = std::move(done)](Locked& later) { done(later, absl::OkStatus()); });
+    peers_.Defer([done = std::move(done)](Locked& later) { done(later, absl::OkStatus()); });
   }
   readings_.erase(found);
 }

@@ -17,7 +17,7 @@
 #include "server/process/task_pool.h"
 #include "server/registry/commit/committer.h"
 #include "server/registry/memory/locked.h"
-#include "server/registry/peers/read_barrier.h"
+#include "server/registry/peers/peer_sync.h"
 #include "server/registry/state/registry_state.h"
 #include "server/registry/watch/change_feed.h"
 #include "server/store/store.h"
@@ -49,8 +49,8 @@ inline constexpr ClientId kWatchReader = {2};
 class RecordReader : public PeerChangeListener, public PageSource {
  public:
   // All must outlive this. loaders: threads for reads without a blocked caller, and for watches.
-  RecordReader(RegistryState& state, Committer& committer, ReadBarrier& barrier, TaskPool& loaders)
-      : state_(state), committer_(committer), barrier_(barrier), loaders_(loaders) {}
+  RecordReader(RegistryState& state, Committer& committer, PeerSync& peers, TaskPool& loaders)
+      : state_(state), committer_(committer), peers_(peers), loaders_(loaders) {}
   RecordReader(const RecordReader&) = delete;
   RecordReader& operator=(const RecordReader&) = delete;
 
@@ -135,7 +135,7 @@ class RecordReader : public PeerChangeListener, public PageSource {
 
   RegistryState& state_;
   Committer& committer_;
-  ReadBarrier& barrier_;
+  PeerSync& peers_;
   TaskPool& loaders_;
 
   // Guarded by mutex_: the unfinished reads, by ID; the reads not yet taken by a thread; and the

@@ -180,7 +180,7 @@ TEST_F(RegistryFreshnessTest, AReadBeyondItsBoundQueriesTheStore) {
   store_.CreateElsewhere("h", 1);
   const Freshness freshness = AtMost(hours(1), hours(2));
   EXPECT_FALSE(IsAnsweredAtOnce("h", freshness));
-  EXPECT_FALSE(registry_.barrier().TryFresh(freshness).has_value());
+  EXPECT_FALSE(registry_.peers().TryFresh(freshness).has_value());
   const int before = store_.asked();
   const auto read = Read("h", freshness);
   ASSERT_TRUE(read.ok()) << read.status();
@@ -201,7 +201,7 @@ TEST_F(RegistryFreshnessTest, AHalfExpiredBoundQueriesTheStoreOnceForLaterReads)
   store_.AwaitQuery(before + 1);
   store_.Release();
   // A read that joined the request of earlier reads: no other request was sent in between.
-  ASSERT_TRUE(registry_.barrier().AwaitPeers({}).ok());
+  ASSERT_TRUE(registry_.peers().AwaitPeers({}).ok());
   EXPECT_EQ(store_.asked(), before + 2);
 }
 
@@ -225,7 +225,7 @@ TEST_F(RegistryFreshnessTest, ABoundIsMeasuredFromTheQueryAndNotFromItsAnswer) {
 TEST_F(RegistryFreshnessTest, ALinearizableReadThatBeganBeforeAQueryNeedsNoOther) {
   Freshness began_before;
   began_before.began = SteadyClock::now();
-  ASSERT_TRUE(registry_.barrier().AwaitPeers({}).ok());
+  ASSERT_TRUE(registry_.peers().AwaitPeers({}).ok());
   const int before = store_.asked();
   EXPECT_TRUE(IsAnsweredAtOnce("h", began_before));
   EXPECT_TRUE(absl::IsNotFound(Read("h", began_before).status()));
@@ -314,7 +314,7 @@ TEST(RegistryFreshness, AStoreOfOneServerIsAlwaysFresh) {
     const auto read = hulls.registry().Resolve("h", {}, freshness);
     ASSERT_TRUE(read.ok()) << read.status();
     EXPECT_EQ(read->first.staleness, nanoseconds(0));
-    EXPECT_EQ(hulls.registry().barrier().TryFresh(freshness), nanoseconds(0));
+    EXPECT_EQ(hulls.registry().peers().TryFresh(freshness), nanoseconds(0));
   }
   freshness.at_least_revision = 2;
   const absl::Status refused = hulls.registry().Resolve("h", {}, freshness).status();

@@ -220,7 +220,7 @@ void Client::Replace() {
 void Client::List() {
   Call call = Begin(0);
   Scheduler::Current().Note("lists hulls");
-  if (const absl::Status fresh = simulation_.registry.barrier().AwaitPeers({}); !fresh.ok()) {
+  if (const absl::Status fresh = simulation_.registry.peers().AwaitPeers({}); !fresh.ok()) {
     if (MayFail(call, fresh, false)) return;
     Fail(call, absl::StrCat("unexpected error: ", fresh.ToString()));
   }
@@ -253,9 +253,9 @@ void Client::List() {
 bool Client::AwaitFresh(const Freshness& freshness) {
   const auto told = std::make_shared<Event>();
   const auto fresh = std::make_shared<absl::Status>();
-  ReadBarrier& barrier = simulation_.registry.barrier();
-  if (barrier.TryFresh(freshness).has_value()) return false;
-  barrier.StartFetch([=](const absl::Status& status) {
+  PeerSync& peers = simulation_.registry.peers();
+  if (peers.TryFresh(freshness).has_value()) return false;
+  peers.StartFetch([=](const absl::Status& status) {
     if (told->is_set()) Scheduler::Current().Fail("a reader is notified twice");
     *fresh = status;
     told->Set();

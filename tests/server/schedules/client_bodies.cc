@@ -138,7 +138,7 @@ void Client::FindBodies() {
   std::vector<std::string> ids;
   for (size_t hull = 0; hull < simulation_.plan.hulls; ++hull) ids.push_back(HullName(hull));
   Scheduler::Current().Note("looks for bodies", ids.size());
-  if (const absl::Status fresh = simulation_.registry.barrier().AwaitPeers({}); !fresh.ok()) {
+  if (const absl::Status fresh = simulation_.registry.peers().AwaitPeers({}); !fresh.ok()) {
     if (MayFail(call, fresh, false)) return;
     Fail(call, absl::StrCat("unexpected error: ", fresh.ToString()));
   }
@@ -162,7 +162,7 @@ void Client::FindBodies() {
 void Client::ListBodies() {
   Call call = Begin(0);
   Scheduler::Current().Note("lists bodies");
-  if (const absl::Status fresh = simulation_.registry.barrier().AwaitPeers({}); !fresh.ok()) {
+  if (const absl::Status fresh = simulation_.registry.peers().AwaitPeers({}); !fresh.ok()) {
     if (MayFail(call, fresh, false)) return;
     Fail(call, absl::StrCat("unexpected error: ", fresh.ToString()));
   }

@@ -100,7 +100,7 @@ void CountStore(const SimulatedStore::Counts& counts, Reached& reached) {
 // The registry has applied all peer changes.
 void CatchUp(Registry& registry) {
   absl::Status status = absl::UnavailableError("");
-  while (absl::IsUnavailable(status)) status = registry.barrier().AwaitPeers({});
+  while (absl::IsUnavailable(status)) status = registry.peers().AwaitPeers({});
 }
 
 void SimulateServers(const Plan& plan, SimulatedStore& database, Reached& reached) {

@@ -254,11 +254,11 @@ TEST_F(PostgresFollow, AServerThatLagsTooFarBehindStops) {
   bool ended = false;
   hulls_->store().OnEnded([&] { ended = true; });
   change(1 << 17);
-  EXPECT_TRUE(hulls_->registry().barrier().AwaitPeers({}).ok());
+  EXPECT_TRUE(hulls_->registry().peers().AwaitPeers({}).ok());
   EXPECT_EQ(hulls_->registry().Sizes().store_revision, 1 << 17);
   EXPECT_FALSE(ended);
   change((1 << 17) + 1);
-  EXPECT_TRUE(absl::IsUnavailable(hulls_->registry().barrier().AwaitPeers({})));
+  EXPECT_TRUE(absl::IsUnavailable(hulls_->registry().peers().AwaitPeers({})));
   EXPECT_TRUE(ended);
 }
 

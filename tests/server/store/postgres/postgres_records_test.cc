@@ -124,7 +124,7 @@ TEST_F(PostgresRecords, EachBatchUpdatesTheTotals) {
   const std::unique_ptr<PostgresRegistry> other = MakeRegistry();
   ASSERT_TRUE(hulls_->Delete("a").ok());
   ASSERT_TRUE(hulls_->Put("b", {{9, 9, 9}}, "other").ok());
-  ASSERT_TRUE(other->registry().barrier().AwaitPeers({}).ok());
+  ASSERT_TRUE(other->registry().peers().AwaitPeers({}).ok());
   EXPECT_EQ(other->registry().Sizes().hull_count, 2);
   EXPECT_EQ(other->registry().Sizes().vertex_count, hulls_->registry().Sizes().vertex_count);
   EXPECT_EQ(KeptVertices(), hulls_->registry().Sizes().vertex_count);
@@ -132,7 +132,7 @@ TEST_F(PostgresRecords, EachBatchUpdatesTheTotals) {
   for (const char* id : {"body-1", "body-2"}) ASSERT_TRUE(PutBody(*hulls_, id).ok());
   ASSERT_TRUE(PutBody(*hulls_, "body-1").ok());
   ASSERT_TRUE(DeleteBody(*hulls_, "body-2").ok());
-  ASSERT_TRUE(other->registry().barrier().AwaitPeers({}).ok());
+  ASSERT_TRUE(other->registry().peers().AwaitPeers({}).ok());
   EXPECT_EQ(hulls_->registry().Sizes().body_count, 1);
   EXPECT_EQ(other->registry().Sizes().body_count, 1);
   EXPECT_EQ(KeptBodies(), CountedBodies());
@@ -224,7 +224,7 @@ TEST_F(PostgresRecords, AWatchReportsBodiesThatAreNotInMemory) {
   ASSERT_TRUE(hulls_->Delete("to-body").ok());
   ASSERT_TRUE(PutBody(*hulls_, "to-body").ok());
   ASSERT_TRUE(PutBody(*hulls_, "new").ok());
-  ASSERT_TRUE(registry.barrier().AwaitPeers({}).ok());
+  ASSERT_TRUE(registry.peers().AwaitPeers({}).ok());
   struct Told {
     std::string id;
     ChangeKind kind;

@@ -95,7 +95,7 @@ class PostgresShared : public PostgresTest {
     return put;
   }
   static std::vector<std::string> Listed(PostgresRegistry& server) {
-    EXPECT_TRUE(server.registry().barrier().AwaitPeers({}).ok());
+    EXPECT_TRUE(server.registry().peers().AwaitPeers({}).ok());
     std::vector<std::string> ids;
     const absl::StatusOr<RecordPage> page = server.registry().records().List("", "", 100);
     EXPECT_TRUE(page.ok()) << page.status();
@@ -255,7 +255,7 @@ TEST_F(PostgresShared, BodiesAndHullsShareTheirIdsAcrossServers) {
   EXPECT_FALSE(again->created);
   EXPECT_EQ(again->body.create_revision, put->body.create_revision);
   EXPECT_TRUE(absl::IsAborted(PutBody(*hulls_, "b", put->body.revision).status()));
-  ASSERT_TRUE(hulls_->registry().barrier().AwaitPeers({}).ok());
+  ASSERT_TRUE(hulls_->registry().peers().AwaitPeers({}).ok());
   const std::string id = "b";
   EXPECT_EQ(hulls_->registry().records().FindBodies(std::span(&id, 1)).bodies[0]->record().revision,
             again->body.revision);
@@ -350,7 +350,7 @@ TEST_F(PostgresShared, WatchesReportIdsThatBecameABodyOrAHull) {
   ASSERT_TRUE(PutBody(*other, "was-body").ok());
   ASSERT_TRUE(PutBody(*other, "replaced").ok());
   Registry& registry = hulls_->registry();
-  ASSERT_TRUE(registry.barrier().AwaitPeers({}).ok());
+  ASSERT_TRUE(registry.peers().AwaitPeers({}).ok());
   ChangeFeed& feed = registry.feed();
   const auto watch_hulls = feed.Open({.lists_existing = false}, {}, [] {});
   const auto watch_both = feed.Open({.bodies = true, .lists_existing = false}, {}, [] {});
@@ -367,7 +367,7 @@ TEST_F(PostgresShared, WatchesReportIdsThatBecameABodyOrAHull) {
   ASSERT_TRUE(delete_body("replaced").ok());
   ASSERT_TRUE(PutBody(*other, "replaced").ok());
   ASSERT_TRUE(PutBody(*other, "replaced").ok());
-  ASSERT_TRUE(registry.barrier().AwaitPeers({}).ok());
+  ASSERT_TRUE(registry.peers().AwaitPeers({}).ok());
 
   using Told = std::tuple<std::string, ChangeKind, bool>;
   const auto told_to = [&](const std::shared_ptr<Watch>& watch) {

@@ -1,4 +1,4 @@
-#include "server/registry/peers/read_barrier.h"
+#include "server/registry/peers/peer_sync.h"
 
 #include <absl/strings/str_cat.h>
 
@@ -26,13 +26,13 @@ absl::Status FutureRevision(uint64_t wanted, uint64_t current) {
 
 }  // namespace
 
-ReadBarrier::ReadBarrier(RegistryState& state, Committer& committer)
+PeerSync::PeerSync(RegistryState& state, Committer& committer)
     : state_(state), committer_(committer), feed_(state.store.peers()) {
   committer_.SetPeers(*this);
 }
 
 // The pages of the initial load span more than one revision.
-absl::Status ReadBarrier::Begin(Locked& locked, std::vector<PeerChangeListener*> listeners) {
+absl::Status PeerSync::Begin(Locked& locked, std::vector<PeerChangeListener*> listeners) {
   if (!has_peers()) return absl::OkStatus();
   listeners_ = std::move(listeners);
   const SteadyClock::time_point asked = SteadyClock::now();
@@ -43,29 +43,29 @@ absl::Status ReadBarrier::Begin(Locked& locked, std::vector<PeerChangeListener*>
   return fetched;
 }
 
-void ReadBarrier::End() {
+void PeerSync::End() {
   if (has_peers()) feed_->OnPeerCommit(nullptr);
 }
 
-absl::Status ReadBarrier::AwaitPeers(const std::function<bool()>& should_stop) {
+absl::Status PeerSync::AwaitPeers(const std::function<bool()>& should_stop) {
   if (!has_peers()) return absl::OkStatus();
   Locked locked(state_.mutex);
   return AwaitPeers(locked, should_stop);
 }
 
-absl::Status ReadBarrier::AwaitPeers(Locked& locked, const std::function<bool()>& should_stop) {
+absl::Status PeerSync::AwaitPeers(Locked& locked, const std::function<bool()>& should_stop) {
   if (!has_peers()) return absl::OkStatus();
   return locked.AwaitCall(should_stop,
                           [&](const auto& done) { committer_.StartBarrier(locked, done); });
 }
 
-std::optional<nanoseconds> ReadBarrier::TryFresh(const Freshness& freshness) {
+std::optional<nanoseconds> PeerSync::TryFresh(const Freshness& freshness) {
   if (!has_peers() && freshness.at_least_revision == 0) return nanoseconds(0);
   Locked locked(state_.mutex);
   return TryFresh(locked, freshness);
 }
 
-std::optional<nanoseconds> ReadBarrier::TryFresh(Locked& /*locked*/, const Freshness& freshness) {
+std::optional<nanoseconds> PeerSync::TryFresh(Locked& /*locked*/, const Freshness& freshness) {
   if (state_.revision() < freshness.at_least_revision) return std::nullopt;
   if (!has_peers()) return nanoseconds(0);
   if (!synced_at_.has_value()) return std::nullopt;
@@ -80,14 +80,14 @@ std::optional<nanoseconds> ReadBarrier::TryFresh(Locked& /*locked*/, const Fresh
   return staleness;
 }
 
-absl::StatusOr<nanoseconds> ReadBarrier::AwaitFresh(const Freshness& freshness,
-                                                    const std::function<bool()>& should_stop) {
+absl::StatusOr<nanoseconds> PeerSync::AwaitFresh(const Freshness& freshness,
+                                                 const std::function<bool()>& should_stop) {
   Locked locked(state_.mutex);
   return AwaitFresh(locked, freshness, should_stop);
 }
 
-absl::StatusOr<nanoseconds> ReadBarrier::AwaitFresh(Locked& locked, const Freshness& freshness,
-                                                    const std::function<bool()>& should_stop) {
+absl::StatusOr<nanoseconds> PeerSync::AwaitFresh(Locked& locked, const Freshness& freshness,
+                                                 const std::function<bool()>& should_stop) {
   if (const auto staleness = TryFresh(locked, freshness)) return *staleness;
   HULLD_RETURN_IF_ERROR(AwaitPeers(locked, should_stop));
   const uint64_t revision = state_.revision();
@@ -95,7 +95,7 @@ absl::StatusOr<nanoseconds> ReadBarrier::AwaitFresh(Locked& locked, const Freshn
   return FutureRevision(freshness.at_least_revision, revision);
 }
 
-void ReadBarrier::StartFetch(std::function<void(const absl::Status&)> done) {
+void PeerSync::StartFetch(std::function<void(const absl::Status&)> done) {
   if (!has_peers()) return done(absl::OkStatus());
   Locked locked(state_.mutex);
   committer_.StartBarrier(locked,
@@ -104,13 +104,13 @@ void ReadBarrier::StartFetch(std::function<void(const absl::Status&)> done) {
                           });
 }
 
-void ReadBarrier::WhenFresh(Refusal refuse, LockedTask next) {
+void PeerSync::WhenFresh(Refusal refuse, LockedTask next) {
   Locked locked(state_.mutex);
   if (!has_peers()) return next(locked);
   committer_.AddBarrier(RunOrRefuse(std::move(refuse), std::move(next)));
 }
 
-Committer::Barrier ReadBarrier::RunOrRefuse(Refusal refuse, LockedTask next) {
+Committer::Barrier PeerSync::RunOrRefuse(Refusal refuse, LockedTask next) {
   return [refuse = std::move(refuse), next = std::move(next)](Locked& locked,
                                                               const absl::Status& status) {
     if (status.ok()) return next(locked);
@@ -118,12 +118,12 @@ Committer::Barrier ReadBarrier::RunOrRefuse(Refusal refuse, LockedTask next) {
   };
 }
 
-void ReadBarrier::Defer(LockedTask task) {
+void PeerSync::Defer(LockedTask task) {
   HULLD_CHECK(has_peers());
   deferred_.push_back(std::move(task));
 }
 
-std::vector<HullGrowth> ReadBarrier::GrownHulls(const PeerChanges& changes) const {
+std::vector<HullGrowth> PeerSync::GrownHulls(const PeerChanges& changes) const {
   std::vector<HullGrowth> grown;
   uint64_t points = 0;
   const HullTable::Entries& all = state_.hulls.entries();
@@ -141,7 +141,7 @@ std::vector<HullGrowth> ReadBarrier::GrownHulls(const PeerChanges& changes) cons
   return grown;
 }
 
-void ReadBarrier::Apply(Locked& locked, const PeerChanges& changes) {
+void PeerSync::Apply(Locked& locked, const PeerChanges& changes) {
   std::vector<std::pair<uint64_t, const std::string*>> in_order;
   in_order.reserve(changes.by_id.size());
   for (const auto& [id, change] : changes.by_id) in_order.emplace_back(change.revision, &id);

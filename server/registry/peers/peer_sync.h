@@ -1,5 +1,5 @@
-#ifndef HULLD_SERVER_REGISTRY_PEERS_READ_BARRIER_H_
-#define HULLD_SERVER_REGISTRY_PEERS_READ_BARRIER_H_
+#ifndef HULLD_SERVER_REGISTRY_PEERS_PEER_SYNC_H_
+#define HULLD_SERVER_REGISTRY_PEERS_PEER_SYNC_H_
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
@@ -29,9 +29,9 @@ class PeerChangeListener {
   virtual void OnPeerChange(Locked& locked, const std::string& id, const HullPointer& hull) = 0;
 };
 
-// Blocks calls until the registry satisfies their freshness. If the store has a PeerFeed, follows
-// the commits of peer servers and applies them to the registry's state; otherwise the registry is
-// always current.
+// Keeps the registry in step with the peer servers over one database: follows their commits,
+// applies them to the state, and blocks calls until the state satisfies their freshness. If the
+// store has no PeerFeed, the registry is always current, and nothing blocks.
 //
 // Peer changes are applied on the committer's thread, after the superseded local changes were
 // refused, so no local change to the same IDs is being committed. A thread may still build a chunk
@@ -41,7 +41,7 @@ class PeerChangeListener {
 //
 // Functions with a Locked parameter require the registry's mutex; blocking ones release it. The
 // other functions acquire it.
-class ReadBarrier : public Committer::Peers {
+class PeerSync : public Committer::Peers {
  public:
   // Maximum number of hulls that grow by peer servers' points within one hold of the mutex, and of
   // their points in total; takes a few milliseconds.
@@ -49,9 +49,9 @@ class ReadBarrier : public Committer::Peers {
   static constexpr uint64_t kMaxGrowth = 1 << 16;
 
   // Both must outlive this. Registers with the committer.
-  ReadBarrier(RegistryState& state, Committer& committer);
-  ReadBarrier(const ReadBarrier&) = delete;
-  ReadBarrier& operator=(const ReadBarrier&) = delete;
+  PeerSync(RegistryState& state, Committer& committer);
+  PeerSync(const PeerSync&) = delete;
+  PeerSync& operator=(const PeerSync&) = delete;
 
   // True if a peer server may change an ID before a submitted change of it commits; the change is
   // then retried.
@@ -117,4 +117,4 @@ class ReadBarrier : public Committer::Peers {
 
 }  // namespace hulld::server
 
-#endif  // HULLD_SERVER_REGISTRY_PEERS_READ_BARRIER_H_
+#endif  // HULLD_SERVER_REGISTRY_PEERS_PEER_SYNC_H_
