@@ -96,28 +96,31 @@ absl::Status ByteSource::CheckStart() {
   return mark == "\xFE\xFF" || mark == "\xFF\xFE" ? Utf16Error() : status_;
 }
 
-bool ByteSource::FindLineEnd(size_t from, size_t* length) {
+bool ByteSource::FindLineEnd(size_t from, size_t* length, size_t* end) {
   const std::string_view unread(buffer_.data() + begin_, end_ - begin_);
-  if (line_end_ == LineEnd::kUnknown) {
-    const size_t found = unread.find_first_of("\r\n", from);
-    // A CR at the end of the buffer may be the first half of a CR LF.
-    if (found == std::string_view::npos || (unread[found] == '\r' && found + 1 == unread.size())) {
-      return false;
-    }
-    const bool lone_cr = unread[found] == '\r' && unread[found + 1] != '\n';
-    line_end_ = lone_cr ? LineEnd::kCr : LineEnd::kLf;
-  }
-  *length = unread.find(line_end_ == LineEnd::kCr ? '\r' : '\n', from);
-  return *length != std::string_view::npos;
+  // Searches for the kind of the last line end first: the other kind may be far away, or absent.
+  const size_t found = unread.find(after_cr_ ? '\r' : '\n', from);
+  const size_t at = std::min(found, unread.substr(0, found).find(after_cr_ ? '\n' : '\r', from));
+  if (at == std::string_view::npos) return false;
+  const bool may_pair = unread[at] == '\r' && !(only_cr_ && line_ > 0);
+  // A CR at the end of the buffer may be the first half of a CR LF.
+  if (may_pair && at + 1 == unread.size()) return false;
+  const bool is_pair = may_pair && unread[at + 1] == '\n';
+  after_cr_ = unread[at] == '\r' && !is_pair;
+  only_cr_ = only_cr_ && after_cr_;
+  *length = at;
+  *end = at + (is_pair ? 2 : 1);
+  return true;
 }
 
 bool ByteSource::ReadLine(std::string_view* line) {
   if (at_start_) SkipByteOrderMark();
   if (!status_.ok()) return false;
   size_t length = 0;
+  size_t end = 0;
   size_t searched = 0;
-  while (!FindLineEnd(searched, &length)) {
-    length = end_ - begin_;
+  while (!FindLineEnd(searched, &length, &end)) {
+    length = end = end_ - begin_;
     if (length > kMaxLineBytes) {
       ++line_;
       status_ = ErrorAtLine("the line is longer than 16 MiB; is this a text file?");
@@ -130,7 +133,7 @@ bool ByteSource::ReadLine(std::string_view* line) {
   }
   ++line_;
   *line = std::string_view(buffer_.data() + begin_, length);
-  begin_ = std::min(begin_ + length + 1, end_);
+  begin_ += end;
   while (!line->empty() && line->back() == '\r') line->remove_suffix(1);
   // The end-of-text mark of DOS.
   if (at_end_ && begin_ == end_ && !line->empty() && line->back() == '\x1A') line->remove_suffix(1);

@@ -19,8 +19,9 @@ namespace hulld {
 // Reads a file or pipe sequentially, as lines or bytes, through a single buffer. Memory does not
 // grow with the file. Tracks its position for errors.
 //
-// Lines end at LF or CR LF, or at CR if the first line does. A UTF-8 byte order mark is skipped, as
-// is ^Z at the end of the file. Other lines with a NUL byte or ^Z are errors.
+// Lines end at LF, CR LF, or CR, also within one file. If all lines so far end at CR, an LF ends a
+// line of its own, because it may start binary data. A UTF-8 byte order mark is skipped, as is ^Z
+// at the end of the file. Other lines with a NUL byte or ^Z are errors.
 class ByteSource {
  public:
   static constexpr size_t kMaxLineBytes = size_t{16} << 20;
@@ -77,13 +78,11 @@ class ByteSource {
   absl::Status Truncated(const std::string& what) const;
 
  private:
-  enum class LineEnd { kUnknown, kLf, kCr };
-
   // Moves the unread bytes to the front of the buffer and fills the rest. Returns false at the end.
   bool Refill();
-  // Finds the length of the line at begin_, searching from `from`. Returns false if its end is not
-  // in the buffer.
-  bool FindLineEnd(size_t from, size_t* length);
+  // Finds the length of the line at begin_, without and with its end, searching from `from`.
+  // Returns false if its end is not in the buffer.
+  bool FindLineEnd(size_t from, size_t* length, size_t* end);
   void SkipByteOrderMark();
   absl::Status Utf16Error() const;
 
@@ -97,7 +96,9 @@ class ByteSource {
   uint64_t line_ = 0;
   bool at_start_ = true;
   bool at_end_ = false;
-  LineEnd line_end_ = LineEnd::kUnknown;
+  // True if the last line ended at CR; if no line ended otherwise.
+  bool after_cr_ = false;
+  bool only_cr_ = true;
   absl::Status status_;
   std::function<void(uint64_t)> progress_;
 };

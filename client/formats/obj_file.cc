@@ -44,6 +44,12 @@ class ObjWalk {
     }
     if (keyword == "f") return TakeFace(WithoutComment(rest));
     if ((keyword == "o" || keyword == "g") && receiver_.name) receiver_.name(keyword, Trim(rest));
+    if (keyword == "call" || keyword == "csh") {
+      return source_->ErrorAtLine(
+          absl::StrCat("the file refers to ", Quoted(Trim(rest)),
+                       ", which is not read; insert the content of that file here, and remove \"",
+                       std::string(keyword), "\""));
+    }
     return absl::OkStatus();
   }
 

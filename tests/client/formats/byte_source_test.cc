@@ -38,6 +38,14 @@ TEST(ByteSource, SupportsThreeKindsOfLineEnds) {
   EXPECT_EQ(Lines(""), Strings{});
 }
 
+TEST(ByteSource, LinesOfOneFileMayEndDifferently) {
+  EXPECT_EQ(Lines("a\nb\rc\r\nd\re"), (Strings{"a", "b", "c", "d", "e"}));
+  EXPECT_EQ(Lines("a\r\nb\rc\nd"), (Strings{"a", "b", "c", "d"}));
+  EXPECT_EQ(Lines("a\rb\nc\rd\n"), (Strings{"a", "b", "c", "d"}));
+  // An LF after the CR of a file of Mac OS may be the first byte of binary data.
+  EXPECT_EQ(Lines("a\rb\r\nc"), (Strings{"a", "b", "", "c"}));
+}
+
 TEST(ByteSource, SkipsAUtf8ByteOrderMark) {
   EXPECT_EQ(Lines("\xEF\xBB\xBFx\ny"), (Strings{"x", "y"}));
   EXPECT_EQ(Lines("\xEF\xBB"), (Strings{"\xEF\xBB"}));

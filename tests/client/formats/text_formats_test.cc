@@ -37,6 +37,14 @@ TEST(ObjFile, ErrorsNameFileAndLine) {
 
 // Modeled on malformed.obj, malformed2.obj, and empty.obj of assimp-testmodels, which were formerly
 // accepted.
+TEST(ObjFile, ReferencesToOtherFilesAreErrors) {
+  EXPECT_EQ(ReadText("v 1 2 3\ncall part 2.obj\nv 4 5 6\n", PointFormat::kObj).error(),
+            "FILE:2: the file refers to \"part 2.obj\", which is not read; insert the content of "
+            "that file here, and remove \"call\"");
+  EXPECT_THAT(ReadText("v 1 2 3\ncsh -make\n", PointFormat::kObj).error(),
+              HasSubstr("FILE:2: the file refers to \"-make\""));
+}
+
 TEST(ObjFile, FacesOfABrokenFileAreErrors) {
   const std::string vertices = "v 1 2 3\nv 4 5 6\n";
   EXPECT_EQ(ReadText(vertices + "f 1 2\nf 1/7 3//1 2\n", PointFormat::kObj).error(),
@@ -66,6 +74,26 @@ TEST(TextFiles, BytesThatNoTextContainsAreErrors) {
   EXPECT_THAT(ReadText("v 1 2 3\n\x1A", PointFormat::kObj).xyz(), ElementsAre(1, 2, 3));
   EXPECT_THAT(ReadText("OFF\n1 0 0\n1 2 3\n\x1A", PointFormat::kOff).xyz(), ElementsAre(1, 2, 3));
   EXPECT_THAT(ReadText("x,y,z\n1,2,3\n\x1A", PointFormat::kCsv).xyz(), ElementsAre(1, 2, 3));
+}
+
+// A CR in a file with other line ends was white space: points after it were lost, unnoticed.
+TEST(TextFiles, LineEndsMayVary) {
+  EXPECT_THAT(ReadText("1 2 3\n4 5 6\r7 8 9\r\n", PointFormat::kXyz).xyz(),
+              ElementsAre(1, 2, 3, 4, 5, 6, 7, 8, 9));
+  EXPECT_THAT(ReadText("1 2 3\r4 5 6\n7 8 9\r", PointFormat::kXyz).xyz(),
+              ElementsAre(1, 2, 3, 4, 5, 6, 7, 8, 9));
+  EXPECT_THAT(ReadText("x,y,z\r\n1,2,3\r4,5,6\n", PointFormat::kCsv).xyz(),
+              ElementsAre(1, 2, 3, 4, 5, 6));
+  EXPECT_THAT(ReadText("# a\nv 1 2 3\n# b\rv 4 5 6\n", PointFormat::kObj).xyz(),
+              ElementsAre(1, 2, 3, 4, 5, 6));
+  EXPECT_THAT(ReadText("OFF\n2 0 0\n1 2 3\r4 5 6\n", PointFormat::kOff).xyz(),
+              ElementsAre(1, 2, 3, 4, 5, 6));
+  EXPECT_THAT(ReadText("solid a\nfacet outer loop vertex 1 2 3 vertex 4 5 6 vertex 7 8 9\n"
+                       "endloop endfacet\nendsolid a\rsolid b\rfacet outer loop vertex 1 0 0 "
+                       "vertex 2 0 0 vertex 3 0 0 endloop endfacet endsolid b\n",
+                       PointFormat::kStl)
+                  .counts.points,
+              6u);
 }
 
 TEST(XyzFile, CoordinatesArriveAsTheNearestDoubles) {

@@ -25,6 +25,7 @@ _RELATIVE_TOLERANCE = 1e-3
 _TRIANGLES_AT_ONCE = 256
 _BYTES_TO_CLASSIFY = 1024
 _FORTRAN_EXPONENT = re.compile(r"(?<=[0-9.])[dD]")
+_LINE_END = re.compile("\r\n|\r|\n")
 _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
@@ -142,7 +143,7 @@ def _number(word: str, factor: Fraction, place: str) -> float:
     decimal = _FORTRAN_EXPONENT.sub("E", word)
     try:
         value = float(decimal) if factor == 1 else float(Fraction(decimal) * factor)
-        if not set("_/") & set(word) and abs(value) < float("inf"):
+        if word.isascii() and not set("_/") & set(word) and abs(value) < float("inf"):
             return value
     except (ValueError, OverflowError, ZeroDivisionError):
         pass
@@ -152,7 +153,8 @@ def _number(word: str, factor: Fraction, place: str) -> float:
 def _lines(path: os.PathLike[str], data: bytes) -> Iterator[tuple[str, str]]:
     """Each line with its location, as in FILE:7."""
     text = data.decode("utf-8-sig", "replace")
-    for number, line in enumerate(text.splitlines(), 1):
+    lines = _LINE_END.split(text)
+    for number, line in enumerate(lines if lines[-1] else lines[:-1], 1):
         yield f"{os.fspath(path)}:{number}", line
 
 
@@ -191,6 +193,11 @@ def _read_obj(path: pathlib.Path, data: bytes, scale: Scale) -> Mesh:
             name, group = " ".join(words[1:]), ""
         elif words[0] == "g":
             group = " ".join(words[1:])
+        elif words[0] in ("call", "csh"):
+            raise ValueError(
+                f"{place}: the file refers to {' '.join(words[1:])!r}, which is not read; insert "
+                f"the content of that file here, and remove {words[0]!r}"
+            )
     if continued:
         raise ValueError(f"{place}: the file ends after a backslash that continues its line")
     if not vertices:

@@ -103,6 +103,8 @@ def test_obj_is_read(tmp_path: pathlib.Path) -> None:
     )
     assert points_of(tmp_path / "a.obj", text).tolist() == [[0, 0, 0], [1, 0, 0], [0, 2, 0]]
     assert points_of(tmp_path / "a.obj", "v 1.5D+03 -.5d-1 2.D0\n").tolist() == [[1500, -0.05, 2]]
+    varied = "v 0 0 1\r# a\rv 0 0 2\r\nv 0 0 3\n# b\x0cv 9 9 9\x85v 9 9 9"
+    assert points_of(tmp_path / "a.obj", varied)[:, 2].tolist() == [1, 2, 3]
     for bad, message in (
         ("", "contains no vertices"),
         ("v 0 0\n", "1: a vertex has 2 of 3 coordinates"),
@@ -114,6 +116,8 @@ def test_obj_is_read(tmp_path: pathlib.Path) -> None:
         ("v 0 0 0\nf a\n", "2: 'a' is not a vertex"),
         ("v 0 0 0\nf\n", "2: a face names no vertex"),
         ("v 0 0 0 \\", "1: the file ends after a backslash"),
+        ("v 0 0 0\ncall part 2.obj\n", "2: the file refers to 'part 2.obj', which is not read"),
+        ("v 0 0 \u0661\n", "1: '\u0661' is not a finite number"),
     ):
         with pytest.raises(ValueError, match=message):
             points_of(tmp_path / "a.obj", bad)
