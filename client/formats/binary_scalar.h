@@ -52,8 +52,21 @@ double LoadAs(const unsigned char* little_endian) {
   return static_cast<double>(scalar);
 }
 
+inline constexpr char kNoDouble[] =
+    "a coordinate is a 64-bit integer that no double represents exactly; store it as a double";
+
+// Returns false for a 64-bit integer that LoadScalar would round.
+inline bool IsDouble(ScalarType type, const unsigned char* bytes, bool big_endian) {
+  if (type != ScalarType::kInt64 && type != ScalarType::kUint64) return true;
+  uint64_t magnitude = 0;
+  for (int i = 0; i < 8; ++i) magnitude = magnitude << 8 | bytes[big_endian ? i : 7 - i];
+  if (type == ScalarType::kInt64 && magnitude >> 63 != 0) magnitude = 0 - magnitude;
+  return static_cast<int>(std::bit_width(magnitude)) - std::countr_zero(magnitude) <= 53;
+}
+
 // Returns the value stored in SizeOf(type) bytes. Exact, except for 64-bit integers beyond 2^53,
-// which are rounded to nearest.
+// which are rounded to nearest
+// (see IsDouble).
 inline double LoadScalar(ScalarType type, const unsigned char* bytes, bool big_endian) {
   unsigned char little[kMaxScalarBytes];
   const size_t size = SizeOf(type);

@@ -274,15 +274,19 @@ class BinaryBody {
     element_offset_ = source_->offset();
     for (const Property& property : element.properties) {
       double value = 0;
+      // No file holds a list of 2^60 items.
       const bool complete = property.count_type
                                 ? ReadScalar(*property.count_type, &value) && value >= 0 &&
+                                      value < 0x1p60 &&
                                       ReadList(property, static_cast<uint64_t>(value), corners)
                                 : ReadScalar(property.type, &value);
       if (value < 0 && property.count_type) {
         return source_->ErrorAtByte("the count of a list is negative");
       }
       if (!complete) return source_->Truncated("within the element " + element.name);
-      if (property.axis) (*xyz)[*property.axis] = value;
+      if (!property.axis) continue;
+      if (!is_double_) return Error(kNoDouble);
+      (*xyz)[*property.axis] = value;
     }
     return absl::OkStatus();
   }
@@ -310,6 +314,7 @@ class BinaryBody {
     unsigned char bytes[kMaxScalarBytes];
     if (!source_->Read(bytes, SizeOf(type))) return false;
     *value = LoadScalar(type, bytes, big_endian_);
+    is_double_ = IsDouble(type, bytes, big_endian_);
     return true;
   }
 
@@ -330,6 +335,8 @@ class BinaryBody {
   ByteSource* source_;
   bool big_endian_;
   uint64_t element_offset_ = 0;
+  // False if the last scalar was rounded.
+  bool is_double_ = true;
 };
 
 // Adds each vertex to a collector.

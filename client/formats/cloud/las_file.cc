@@ -156,6 +156,7 @@ absl::Status ReadLas(ByteSource* source, PointCollector* points) {
     for (size_t axis = 0; axis < 3; ++axis) {
       xyz[axis] = std::fma(LoadScalar(ScalarType::kInt32, record.data() + 4 * axis, false),
                            header.scale[axis], header.offset[axis]);
+      if (!std::isfinite(xyz[axis])) return error_at("a coordinate exceeds the largest double");
     }
     absl::Status status = points->Add(xyz[0], xyz[1], xyz[2], error_at);
     if (!status.ok()) return status;

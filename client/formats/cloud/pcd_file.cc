@@ -227,6 +227,7 @@ absl::Status AddBinaryPoint(const Layout& layout,
   std::array<double, 3> xyz = {};
   bool as_float = true;
   for (size_t axis = 0; axis < 3; ++axis) {
+    if (!IsDouble(layout.type[axis], coordinates[axis], false)) return error_at(kNoDouble);
     xyz[axis] = LoadScalar(layout.type[axis], coordinates[axis], false);
     as_float &= layout.type[axis] == ScalarType::kFloat;
   }

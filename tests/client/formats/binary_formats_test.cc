@@ -104,6 +104,45 @@ TEST(PlyFile, BinaryReads64BitIntegers) {
   EXPECT_THAT(read.xyz(), ElementsAre(1, 2, 3));
 }
 
+// They were rounded.
+TEST(PlyFile, Binary64BitCoordinatesMustBeDoubles) {
+  for (const bool big : {false, true}) {
+    const std::string head =
+        PlyHead(big ? "binary_big_endian" : "binary_little_endian",
+                "element vertex 1\nproperty int64 x\nproperty uint64 y\nproperty int64 z\n");
+    const auto read = [&](int64_t x, uint64_t y, int64_t z) {
+      return ReadText(head + Packer(big).Add(x).Add(y).Add(z).data(), PointFormat::kPly);
+    };
+    constexpr int64_t kLeast = std::numeric_limits<int64_t>::min();
+    EXPECT_THAT(read(-(int64_t{1} << 53), 3u << 30, kLeast).xyz(),
+                ElementsAre(-0x1p53, 0x3p30, -0x1p63));
+    EXPECT_THAT(read(0, uint64_t{1} << 63, (int64_t{1} << 53) + 2).xyz(),
+                ElementsAre(0, 0x1p63, 0x1p53 + 2));
+    for (const PointsRead& rounded :
+         {read((int64_t{1} << 53) + 1, 0, 0), read(0, std::numeric_limits<uint64_t>::max(), 0),
+          read(0, 0, kLeast + 1)}) {
+      EXPECT_EQ(rounded.error(), "FILE: byte " + std::to_string(head.size()) +
+                                     ": a coordinate is a 64-bit integer that no double "
+                                     "represents exactly; store it as a double");
+    }
+  }
+}
+
+// The bytes of the list, 2^61 * 8, overflowed to 0.
+TEST(PlyFile, BinaryListsWithTooManyItemsAreErrors) {
+  for (const uint64_t count : {uint64_t{1} << 61, std::numeric_limits<uint64_t>::max()}) {
+    Packer body;
+    body.Add(count).Add(1.0).Add(2.0).Add(3.0);
+    EXPECT_THAT(ReadText(PlyHead("binary_little_endian",
+                                 "element vertex 1\nproperty list uint64 double tags\n"
+                                 "property double x\nproperty double y\nproperty double z\n") +
+                             body.data(),
+                         PointFormat::kPly)
+                    .error(),
+                HasSubstr("within the element vertex; is it complete?"));
+  }
+}
+
 TEST(PlyFile, BinaryAfterACrLfHeader) {
   // The first byte of the body is LF: it must not be parsed as a line end.
   std::string head = PlyHead("binary_little_endian", kFloatVertices);
@@ -182,6 +221,13 @@ TEST(PcdFile, BinaryMixedScalarsBecomeDoubles) {
   ASSERT_TRUE(read.status.ok()) << read.status;
   EXPECT_FALSE(read.all_float());
   EXPECT_THAT(read.xyz(), ElementsAre(0.1, 2.5, -5));
+  Packer rounded;
+  rounded.Add(0.1).Add(2.5f).Add((int64_t{1} << 53) + 1);
+  EXPECT_THAT(ReadText("FIELDS x y z\nSIZE 8 4 8\nTYPE F F I\nWIDTH 1\nHEIGHT 1\nDATA binary\n" +
+                           rounded.data(),
+                       PointFormat::kPcd)
+                  .error(),
+              HasSubstr("a 64-bit integer that no double represents exactly"));
 }
 
 TEST(PcdFile, BinaryOrganizedCloudsLoseTheirHolesIfRequested) {
