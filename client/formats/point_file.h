@@ -32,9 +32,9 @@ bool IsMeshFormat(PointFormat format);
 // Points by format: obj: each `v` (weights and colors are ignored); off, ply, pcd, las: each
 // vertex; xyz, csv: the columns that the header names x, y, and z, or the first three; stl: each
 // corner of each triangle; gltf, dae: each vertex of each mesh, transformed by its node, once per
-// node that uses it. COLLADA (dae) is converted to meters using the file's unit, and keeps its
-// axes, as robot descriptions expect: up_axis is ignored. Coordinates of a mesh that no node moves
-// are rounded once.
+// node that uses it; vertices of gltf that no index names are omitted. COLLADA (dae) is converted
+// to meters using the file's unit, and keeps its axes, as robot descriptions expect: up_axis is
+// ignored. Coordinates of a mesh that no node moves are rounded once.
 //
 // `path` "-" is standard input. `progress`, if set, periodically receives the number of bytes read.
 struct ReadRequest {

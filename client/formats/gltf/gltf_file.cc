@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -63,6 +64,24 @@ class GltfWalk {
           {corners[mode == kFan ? 0 : i - 2 + odd], corners[i - 1 - odd], corners[i]});
     }
     return triangles;
+  }
+
+  // Keeps the vertices named by `corners`, in order. Primitives may share the positions of one
+  // accessor.
+  static void KeepOnly(const std::vector<uint32_t>& corners, TriangleMesh* mesh) {
+    constexpr uint32_t kUnused = std::numeric_limits<uint32_t>::max();
+    std::vector<uint32_t> number(mesh->vertices.size(), kUnused);
+    for (const uint32_t corner : corners) number[corner] = 0;
+    uint32_t kept = 0;
+    for (size_t i = 0; i < number.size(); ++i) {
+      if (number[i] == kUnused) continue;
+      mesh->vertices[kept] = mesh->vertices[i];
+      number[i] = kept++;
+    }
+    mesh->vertices.resize(kept);
+    for (auto& triangle : mesh->triangles) {
+      for (uint32_t& corner : triangle) corner = number[corner];
+    }
   }
 
   // Adds the weighted displacements of the morph targets.
@@ -169,7 +188,8 @@ class GltfWalk {
     vertices =
         document_.ElementsOf<3>(document_.Integer(*position, "POSITION"), &primitive->is_float);
     std::vector<uint32_t> corners;
-    if (const auto index = document_.IntegerOf(object, "indices"); ok() && index) {
+    const auto index = document_.IntegerOf(object, "indices");
+    if (ok() && index) {
       const Struct& accessor = document_.Element("accessors", *index);
       const size_t count = document_.IntegerOf(accessor, "count").value_or(0);
       corners = document_.Indices(accessor, count, vertices.size(),
@@ -177,22 +197,20 @@ class GltfWalk {
     } else if (mode >= 4) {
       for (uint32_t i = 0; i < vertices.size(); ++i) corners.push_back(i);
     }
-    if (mode == 4 && GltfDocument::Find(object, "indices") != nullptr && corners.size() % 3 != 0) {
+    if (mode == 4 && index && corners.size() % 3 != 0) {
       Fail(absl::StrCat("a primitive has ", corners.size(),
                         " corners, not three for each triangle"));
     }
     if (!ok()) return;
     primitive->mesh.triangles = Triangles(corners, mode);
-    vertices_ += vertices.size();
     Morph(object, weights, primitive);
     const auto skin = document_.IntegerOf(node, "skin");
     // A mesh with a skin is placed by the joints alone.
-    if (ok() && skin && Bend(attributes, JointsOf(*skin), primitive)) {
-      if (ok()) document_.Keep(visit_(*primitive));
-      return;
-    }
+    const bool bent = ok() && skin && Bend(attributes, JointsOf(*skin), primitive);
     if (!ok()) return;
-    if (X_WN != nullptr) {
+    if (index) KeepOnly(corners, &primitive->mesh);
+    vertices_ += vertices.size();
+    if (X_WN != nullptr && !bent) {
       for (auto& vertex : vertices) vertex = *X_WN * vertex;
       primitive->is_float = false;
     }
@@ -233,9 +251,13 @@ class GltfWalk {
     } else {
       if (!q.empty()) {
         const double x = q[0], y = q[1], z = q[2], w = q[3];
-        X.m = {{{1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y), 0},
-                {2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x), 0},
-                {2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y), 0}}};
+        // Not 1: files contain rounded floats.
+        const double n = x * x + y * y + z * z + w * w;
+        if (!(n > 0 && std::isfinite(n))) Fail("a rotation is not a unit quaternion");
+        X.m = {
+            {{1 - 2 * (y * y + z * z) / n, 2 * (x * y - w * z) / n, 2 * (x * z + w * y) / n, 0},
+             {2 * (x * y + w * z) / n, 1 - 2 * (x * x + z * z) / n, 2 * (y * z - w * x) / n, 0},
+             {2 * (x * z - w * y) / n, 2 * (y * z + w * x) / n, 1 - 2 * (x * x + y * y) / n, 0}}};
       }
       for (size_t row = 0; row < 3; ++row) {
         for (size_t column = 0; column < 3 && !s.empty(); ++column) X.m[row][column] *= s[column];

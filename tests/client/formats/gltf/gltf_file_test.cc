@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "client/formats/mesh_file.h"
 #include "tests/client/formats/point_reading.h"
 
@@ -117,6 +119,19 @@ TEST(GltfFile, NodesComposeMatricesAndRotations) {
               ElementsAre(0.1f, 0, 1, 1, 0, 1, 0, -2, 1));
   EXPECT_THAT(Error(Gltf(Bytes(kTriangle), kFloats, R"(,"children":[0])")),
               HasSubstr("several parents"));
+}
+
+// Exporters write quaternions as floats: half a turn about x + y, then a quarter turn about z.
+TEST(GltfFile, RotationsAreNormalized) {
+  const auto turned = [](const std::string& quaternion) {
+    return Gltf(Bytes(kTriangle), kFloats, R"(,"rotation":)" + quaternion);
+  };
+  EXPECT_THAT(ReadText(turned("[0.70710677,0.70710677,0,0]"), PointFormat::kGltf).xyz(),
+              ElementsAre(0, 0.1f, 0, 0, 1, 0, 2, 0, 0));
+  EXPECT_THAT(ReadText(turned("[0,0,3,3]"), PointFormat::kGltf).xyz(),
+              ElementsAre(0, 0.1f, 0, 0, 1, 0, -2, 0, 0));
+  EXPECT_THAT(Error(turned("[0,0,0,0]")), HasSubstr("rotation is not a unit quaternion"));
+  EXPECT_THAT(Error(turned("[0,0,0,1e200]")), HasSubstr("rotation is not a unit quaternion"));
 }
 
 TEST(GltfFile, BuffersMayBeFilesWithEscapedNames) {
@@ -260,6 +275,31 @@ TEST(GltfFile, IndicesMakeTrianglesOfEachMode) {
   EXPECT_THAT(triangles("4", "3"), ElementsAre(ElementsAre(0, 1, 2)));
   EXPECT_THAT(triangles("5", "4"), ElementsAre(ElementsAre(0, 1, 2), ElementsAre(2, 1, 3)));
   EXPECT_THAT(triangles("6", "4"), ElementsAre(ElementsAre(0, 1, 2), ElementsAre(0, 2, 3)));
+}
+
+// The other vertices of a shared accessor are not part of the mesh.
+TEST(GltfFile, VerticesWithoutAnIndexAreOmitted) {
+  const std::string bytes =
+      Bytes<float>({9, 9, 9, 1, 0, 0, NAN, 9, 9, 0, 1, 0, 0, 0, 1}) + Bytes<uint8_t>({4, 1, 3});
+  const std::string text =
+      Replaced(Replaced(Gltf(bytes, R"("componentType":5126,"count":5)"), R"("attributes")",
+                        R"("indices":1,"attributes")"),
+               R"("count":5}])",
+               R"("count":5},{"bufferView":0,"byteOffset":60,"componentType":5121,"count":3}])");
+  const PointsRead read = ReadText(text, PointFormat::kGltf);
+  ASSERT_TRUE(read.status.ok()) << read.status;
+  EXPECT_TRUE(read.all_float());
+  EXPECT_THAT(read.xyz(), ElementsAre(1, 0, 0, 0, 1, 0, 0, 0, 1));
+  EXPECT_THAT(
+      ReadText(Replaced(text, R"("indices":1)", R"("indices":1,"mode":0)"), PointFormat::kGltf)
+          .xyz(),
+      ElementsAre(1, 0, 0, 0, 1, 0, 0, 0, 1));
+  const TempFile file("a.gltf", text);
+  const auto mesh = ReadMesh(file.path());
+  ASSERT_TRUE(mesh.ok()) << mesh.status();
+  EXPECT_THAT(mesh->vertices,
+              ElementsAre(ElementsAre(1, 0, 0), ElementsAre(0, 1, 0), ElementsAre(0, 0, 1)));
+  EXPECT_THAT(mesh->triangles, ElementsAre(ElementsAre(2, 0, 1)));
 }
 
 TEST(GltfFile, BinaryFilesAreReadAndTruncatedOnesRefused) {
