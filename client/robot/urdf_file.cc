@@ -8,6 +8,7 @@
 #include <map>
 #include <optional>
 #include <span>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -37,6 +38,11 @@ std::optional<Kind> KindOf(const std::pair<const char*, Kind> (&kinds)[n],
   return std::nullopt;
 }
 
+RigidPose Normalized(double x, double y, double z, double w) {
+  const double length = std::sqrt(x * x + y * y + z * z + w * w);
+  return {w / length, x / length, y / length, z / length, 0, 0, 0};
+}
+
 // Returns the rotation Rz(yaw) Ry(pitch) Rx(roll), in liburdfdom's order of operations, so that
 // poses agree with it to the last bit.
 RigidPose RotationOfUrdf(double roll, double pitch, double yaw) {
@@ -50,8 +56,7 @@ RigidPose RotationOfUrdf(double roll, double pitch, double yaw) {
   const double y = cr * sp * cy + sr * cp * sy;
   const double z = cr * cp * sy - sr * sp * cy;
   const double w = cr * cp * cy + sr * sp * sy;
-  const double length = std::sqrt(x * x + y * y + z * z + w * w);
-  return {w / length, x / length, y / length, z / length, 0, 0, 0};
+  return Normalized(x, y, z, w);
 }
 
 // Reads links and joints by name, and then the tree that they form.
@@ -136,11 +141,28 @@ class UrdfReader {
   // Reads the pose of an element; no motion if it has no <origin>.
   absl::Status TakeOrigin(pugi::xml_node parent, RigidPose* pose) const {
     const pugi::xml_node origin = parent.child("origin");
-    if (!origin) return absl::OkStatus();
+    for (const pugi::xml_attribute attribute : origin.attributes()) {
+      const std::string_view name = attribute.name();
+      if (name == "xyz" || name == "rpy" || name == "quat_xyzw") continue;
+      // An ignored attribute would result in another pose.
+      return document_.ErrorAt(origin, absl::StrCat("<origin> has no attribute ", Quoted(name),
+                                                    "; attributes are xyz, rpy, and quat_xyzw"));
+    }
     if (origin.attribute("rpy")) {
       const auto rpy = NumbersOf(document_, origin, "rpy", 3);
       if (!rpy.ok()) return rpy.status();
       *pose = RotationOfUrdf((*rpy)[0], (*rpy)[1], (*rpy)[2]);
+    }
+    if (origin.attribute("quat_xyzw")) {
+      if (origin.attribute("rpy")) {
+        return document_.ErrorAt(origin, "<origin> has both rpy and quat_xyzw; remove one");
+      }
+      const auto q = NumbersOf(document_, origin, "quat_xyzw", 4);
+      if (!q.ok()) return q.status();
+      *pose = Normalized((*q)[0], (*q)[1], (*q)[2], (*q)[3]);
+      if (!std::isfinite((*pose)[0])) {
+        return document_.ErrorAt(origin, "<origin> quat_xyzw is not a unit quaternion");
+      }
     }
     if (!origin.attribute("xyz")) return absl::OkStatus();
     const auto xyz = NumbersOf(document_, origin, "xyz", 3);
@@ -153,8 +175,12 @@ class UrdfReader {
     if (absl::Status good = TakeOrigin(collision, &shape->X_LS); !good.ok()) return good;
     const pugi::xml_node geometry = collision.child("geometry");
     if (!geometry) return document_.ErrorAt(collision, "<collision> lacks <geometry>");
-    const pugi::xml_node element = geometry.find_child(
-        [](pugi::xml_node child) { return child.type() == pugi::node_element; });
+    const auto is_element = [](pugi::xml_node child) { return child.type() == pugi::node_element; };
+    const pugi::xml_node element = geometry.find_child(is_element);
+    if (std::count_if(geometry.begin(), geometry.end(), is_element) > 1) {
+      return document_.ErrorAt(
+          geometry, "<geometry> contains several shapes; write one <collision> for each");
+    }
     const std::string name = element.name();
     const std::optional<ShapeKind> kind = KindOf(kShapes, name);
     if (!kind) {

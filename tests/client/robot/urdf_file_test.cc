@@ -101,6 +101,20 @@ TEST(UrdfFile, ScalesOfMeshesAreExact) {
   EXPECT_EQ(scale[2].Apply(3), -3);
 }
 
+// The attribute was ignored: the shape was not rotated.
+TEST(UrdfFile, OriginsMayHaveQuaternions) {
+  const auto pose_of = [](const std::string& attributes) {
+    const auto robot =
+        ParseUrdf(Changed("<box size=\"2 2 1\"/></geometry>",
+                          "<box size=\"2 2 1\"/></geometry><origin " + attributes + "/>"),
+                  "arm.urdf");
+    EXPECT_TRUE(robot.ok()) << robot.status();
+    return robot.ok() ? robot->links[0].shapes[0].X_LS : RigidPose();
+  };
+  EXPECT_EQ(pose_of("quat_xyzw=\"0 0 3 4\" xyz=\"1 2 3\""), (RigidPose{0.8, 0, 0, 0.6, 1, 2, 3}));
+  EXPECT_EQ(pose_of("quat_xyzw=\"0 1 0 0\""), (RigidPose{0, 0, 1, 0, 0, 0, 0}));
+}
+
 TEST(UrdfFile, ErrorsNameLineAndElement) {
   const std::pair<std::string, std::string> none = {"", ""};
   const struct {
@@ -111,6 +125,14 @@ TEST(UrdfFile, ErrorsNameLineAndElement) {
       {{"size=\"2 2 1\"", "size=\"2 two 1\""}, "arm.urdf:5: <box> size: \"two\" is not a number"},
       {{"size=\"2 2 1\"", "size=\"2 0 1\""}, "arm.urdf:5: <box> size must be above 0"},
       {{"size=\"2 2 1\"", ""}, "arm.urdf:5: <box> lacks size=\"...\""},
+      {{"<geometry><box", "<origin xyz=\"0 0 0\" rot=\"1 0 0\"/><geometry><box"},
+       "arm.urdf:5: <origin> has no attribute \"rot\"; attributes are xyz, rpy, and quat_xyzw"},
+      {{"<geometry><box", "<origin rpy=\"0 0 0\" quat_xyzw=\"0 0 0 1\"/><geometry><box"},
+       "arm.urdf:5: <origin> has both rpy and quat_xyzw; remove one"},
+      {{"<geometry><box", "<origin quat_xyzw=\"0 0 0 0\"/><geometry><box"},
+       "arm.urdf:5: <origin> quat_xyzw is not a unit quaternion"},
+      {{"<geometry><box", "<geometry><sphere radius=\"1\"/><box"},
+       "arm.urdf:5: <geometry> contains several shapes; write one <collision> for each"},
       {{"<box size=\"2 2 1\"/>", "<cone/>"}, "arm.urdf:5: <geometry> contains \"cone\""},
       {{"<link name=\"upper\">", "<link>"}, "arm.urdf:12: <link> lacks name"},
       {{"<link name=\"upper\">", "<link name=\"base\">"},

@@ -122,21 +122,39 @@ def _origin_of(element: Element) -> PoseNumbers:
     origin = element.first("origin")
     if origin is None:
         return NO_MOTION
+    for name in origin.attributes:
+        # An ignored attribute would result in another pose.
+        if name not in ("xyz", "rpy", "quat_xyzw"):
+            raise origin.error(
+                f"<origin> has no attribute {name!r}; attributes are xyz, rpy, and quat_xyzw"
+            )
     x, y, z = origin.numbers("xyz", 3) if "xyz" in origin.attributes else (0.0, 0.0, 0.0)
-    roll, pitch, yaw = (
-        (half / 2 for half in origin.numbers("rpy", 3))
-        if "rpy" in origin.attributes
-        else (0.0, 0.0, 0.0)
-    )
-    # Rz(yaw) Ry(pitch) Rx(roll), in liburdfdom's order of operations, so that poses agree with it.
-    cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
-    cy, sy = math.cos(yaw), math.sin(yaw)
-    i = sr * cp * cy - cr * sp * sy
-    j = cr * sp * cy + sr * cp * sy
-    k = cr * cp * sy - sr * sp * cy
-    w = cr * cp * cy + sr * sp * sy
+    if "quat_xyzw" in origin.attributes:
+        if "rpy" in origin.attributes:
+            raise origin.error("<origin> has both rpy and quat_xyzw; remove one")
+        i, j, k, w = origin.numbers("quat_xyzw", 4)
+    else:
+        i, j, k, w = _rotation_of(
+            *(origin.numbers("rpy", 3) if "rpy" in origin.attributes else (0.0, 0.0, 0.0))
+        )
     length = math.sqrt(i * i + j * j + k * k + w * w)
+    if not 0 < length < math.inf:
+        raise origin.error("<origin> quat_xyzw is not a unit quaternion")
     return (w / length, i / length, j / length, k / length, x, y, z)
+
+
+def _rotation_of(roll: float, pitch: float, yaw: float) -> tuple[float, float, float, float]:
+    """Rz(yaw) Ry(pitch) Rx(roll) as x y z w, in liburdfdom's order of operations, so that poses
+    agree with it."""
+    cr, sr = math.cos(roll / 2), math.sin(roll / 2)
+    cp, sp = math.cos(pitch / 2), math.sin(pitch / 2)
+    cy, sy = math.cos(yaw / 2), math.sin(yaw / 2)
+    return (
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+        cr * cp * cy + sr * sp * sy,
+    )
 
 
 def _shapes_of(link: Element) -> list[Shape]:
@@ -147,6 +165,10 @@ def _shapes_of(link: Element) -> list[Shape]:
         if geometry is None:
             raise collision.error("<collision> lacks <geometry>")
         element = next(iter(geometry.children), None)
+        if len(geometry.children) > 1:
+            raise geometry.error(
+                "<geometry> contains several shapes; write one <collision> for each"
+            )
         if element is None or element.tag not in get_args(ShapeKind):
             raise (element or geometry).error(
                 f"<geometry> contains {repr(element.tag) if element else 'nothing'}; it must "

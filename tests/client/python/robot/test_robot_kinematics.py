@@ -197,6 +197,22 @@ def test_configurations_are_checked(write: Write) -> None:
             "2: <geometry> contains 'cone'; it must contain a box",
         ),
         ('<box size="1 1 1"/>', "", "2: <geometry> contains nothing"),
+        (
+            '<box size="1 1 1"/>',
+            '<box size="1 1 1"/><sphere radius="1"/>',
+            "2: <geometry> contains several shapes",
+        ),
+        ("<geometry><box", '<origin rot="1 0 0"/><geometry><box', "<origin> has no attribute 'rot'"),
+        (
+            "<geometry><box",
+            '<origin rpy="0 0 0" quat_xyzw="0 0 0 1"/><geometry><box',
+            "<origin> has both rpy and quat_xyzw",
+        ),
+        (
+            "<geometry><box",
+            '<origin quat_xyzw="0 0 0 0"/><geometry><box',
+            "quat_xyzw is not a unit quaternion",
+        ),
         ('<box size="1 1 1"/>', '<cylinder radius="1"/>', '2: <cylinder> lacks length="..."'),
         ('<box size="1 1 1"/>', '<mesh scale="1 1 1"/>', '2: <mesh> lacks filename="..."'),
         (
@@ -212,6 +228,12 @@ def test_defects_of_a_description_are_named(write: Write, old: str, new: str, me
     with pytest.raises(ValueError, match=message) as refused:
         hulld.Robot.from_urdf(write(ARM.replace(old, new)))
     assert "arm.urdf:" in str(refused.value)
+
+
+def test_origins_may_have_quaternions(write: Write) -> None:
+    origin = '<origin quat_xyzw="0 0 3 4" xyz="1 2 3"/><geometry><box'
+    robot = read_urdf(write(ARM.replace("<geometry><box", origin, 1)))
+    assert robot.links[0].shapes[0].X_LS == (0.8, 0, 0, 0.6, 1, 2, 3)
 
 
 def test_other_arguments_are_checked(write: Write) -> None:
