@@ -54,24 +54,6 @@ bool ParseNonFinite(std::string_view text, double* value) {
   return true;
 }
 
-// Returns the length of the UTF-8 character at the start of the text, which is not empty; 0 if it
-// is malformed. Source: the table of well-formed sequences of the Unicode Standard, section 3.9.
-size_t CharacterLength(std::string_view text) {
-  const auto byte = [text](size_t i) { return static_cast<unsigned char>(text[i]); };
-  const unsigned lead = byte(0);
-  if (lead < 0x80) return 1;
-  if (lead < 0xC2 || lead > 0xF4) return 0;
-  const size_t length = lead < 0xE0 ? 2 : lead < 0xF0 ? 3 : 4;
-  if (text.size() < length) return 0;
-  for (size_t i = 1; i < length; ++i) {
-    if ((byte(i) & 0xC0) != 0x80) return 0;
-  }
-  const bool overlong = (lead == 0xE0 && byte(1) < 0xA0) || (lead == 0xF0 && byte(1) < 0x90);
-  const bool surrogate = lead == 0xED && byte(1) >= 0xA0;
-  const bool too_large = lead == 0xF4 && byte(1) >= 0x90;
-  return overlong || surrogate || too_large ? 0 : length;
-}
-
 }  // namespace
 
 NumberText ParseDouble(std::string_view text, double* value) {
@@ -181,10 +163,36 @@ std::string Quoted(std::string_view text) {
   return quoted;
 }
 
+// Source: the table of well-formed sequences of the Unicode Standard, section 3.9.
+size_t Utf8Length(std::string_view text) {
+  const auto byte = [text](size_t i) { return static_cast<unsigned char>(text[i]); };
+  const unsigned lead = byte(0);
+  if (lead < 0x80) return 1;
+  if (lead < 0xC2 || lead > 0xF4) return 0;
+  const size_t length = lead < 0xE0 ? 2 : lead < 0xF0 ? 3 : 4;
+  if (text.size() < length) return 0;
+  for (size_t i = 1; i < length; ++i) {
+    if ((byte(i) & 0xC0) != 0x80) return 0;
+  }
+  const bool overlong = (lead == 0xE0 && byte(1) < 0xA0) || (lead == 0xF0 && byte(1) < 0x90);
+  const bool surrogate = lead == 0xED && byte(1) >= 0xA0;
+  const bool too_large = lead == 0xF4 && byte(1) >= 0x90;
+  return overlong || surrogate || too_large ? 0 : length;
+}
+
+bool IsUtf8(std::string_view text) {
+  while (!text.empty()) {
+    const size_t length = Utf8Length(text);
+    if (length == 0) return false;
+    text.remove_prefix(length);
+  }
+  return true;
+}
+
 std::string Printable(std::string_view text) {
   std::string printable;
   while (!text.empty()) {
-    const size_t length = CharacterLength(text);
+    const size_t length = Utf8Length(text);
     const bool is_control = length == 1 && (text[0] < ' ' || text[0] == '\x7F');
     if (length == 0 || is_control) {
       printable += '?';
@@ -206,6 +214,9 @@ std::string JsonProblem(std::string_view message) {
     const size_t name = end == std::string_view::npos ? 0 : end + 2;
     return (name > 0 ? std::string(path.substr(1, name - 3)) : "the message") + " has no field " +
            Quoted(path.substr(name));
+  }
+  if (message == "JSON transcoder produced invalid protobuf output.") {
+    return "objects or arrays are nested too deeply";
   }
   const size_t first = message.find('\n');
   const size_t last = message.rfind('\n');

@@ -3,6 +3,7 @@
 
 #include <absl/status/status.h>
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -51,6 +52,13 @@ std::string_view WithoutComment(std::string_view line);
 // Returns the text in double quotes, shortened and with unprintable characters replaced, for an
 // error message.
 std::string Quoted(std::string_view text);
+
+// Returns the length of the UTF-8 character at the start of the text, which is not empty; 0 if it
+// is malformed.
+size_t Utf8Length(std::string_view text);
+
+// Returns true if the text is well-formed UTF-8.
+bool IsUtf8(std::string_view text);
 
 // Returns the text with "?" in place of control characters and of bytes that are not UTF-8.
 std::string Printable(std::string_view text);

@@ -8,6 +8,8 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <system_error>
 #include <utility>
 
 #include "client/formats/text_number.h"
@@ -41,6 +43,18 @@ std::vector<std::string> CommandNames(const CommandDescription& command) {
     if (!below->hidden) names.push_back(below->name);
   }
   return names;
+}
+
+// Rejects values that no message of the contract can contain. Names of files may be any bytes.
+void CheckUtf8(CLI::Option* option, const OptionDescription* description) {
+  const auto check = [description](const std::string& value) -> std::string {
+    const ValueKind kind = description->value_kind;
+    std::error_code ignored;
+    const bool is_file = kind == ValueKind::kFile || kind == ValueKind::kDirectory ||
+                         (kind == ValueKind::kShape && std::filesystem::exists(value, ignored));
+    return is_file || IsUtf8(value) ? "" : Quoted(value) + " is not UTF-8";
+  };
+  option->check(CLI::Validator(check, ""));
 }
 
 }  // namespace
@@ -121,14 +135,18 @@ void Command::RequireCommand() { app_->require_subcommand(1); }
 Option Command::AddText(const std::string& name, std::string* value, const std::string& help) {
   OptionDescription* const description = Describe(name, help);
   if (!description->is_argument()) description->value_name = "TEXT";
-  return Option(app_->add_option(name, *value, help), description);
+  CLI::Option* const option = app_->add_option(name, *value, help);
+  CheckUtf8(option, description);
+  return Option(option, description);
 }
 
 Option Command::AddTexts(const std::string& name, std::vector<std::string>* values,
                          const std::string& help) {
   OptionDescription* const description = Describe(name, help);
   description->repeated = true;
-  return Option(app_->add_option(name, *values, help), description);
+  CLI::Option* const option = app_->add_option(name, *values, help);
+  CheckUtf8(option, description);
+  return Option(option, description);
 }
 
 Option Command::AddRepeated(const std::string& name, std::vector<std::string>* values,
@@ -137,6 +155,7 @@ Option Command::AddRepeated(const std::string& name, std::vector<std::string>* v
   description->value_name = "TEXT";
   CLI::Option* const option = app_->add_option(name, *values, help);
   option->allow_extra_args(false);
+  CheckUtf8(option, description);
   return Option(option, description);
 }
 

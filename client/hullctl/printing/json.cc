@@ -5,6 +5,8 @@
 #include <google/protobuf/struct.pb.h>
 #include <google/protobuf/util/json_util.h>
 
+#include <algorithm>
+
 #include "client/formats/text_number.h"
 
 namespace hulld {
@@ -41,15 +43,19 @@ absl::Status ParseMember(const std::string& json, const std::string& name,
 std::string QuoteJson(std::string_view text) {
   static constexpr char kHex[] = "0123456789abcdef";
   std::string quoted = "\"";
-  for (const char c : text) {
-    const unsigned char byte = static_cast<unsigned char>(c);
-    if (c == '"' || c == '\\') {
-      (quoted += '\\') += c;
+  while (!text.empty()) {
+    const size_t length = Utf8Length(text);
+    const auto byte = static_cast<unsigned char>(text[0]);
+    if (length == 0) {
+      quoted += "\xEF\xBF\xBD";
+    } else if (text[0] == '"' || text[0] == '\\') {
+      (quoted += '\\') += text[0];
     } else if (byte < 0x20 || byte == 0x7f) {
       ((quoted += "\\u00") += kHex[byte >> 4]) += kHex[byte & 15];
     } else {
-      quoted += c;
+      quoted += text.substr(0, length);
     }
+    text.remove_prefix(std::max<size_t>(length, 1));
   }
   return quoted + "\"";
 }

@@ -24,7 +24,7 @@ absl::Status ParseJson(const std::string& json, UnknownFields unknown,
 absl::Status ParseMember(const std::string& json, const std::string& name,
                          google::protobuf::Message* message);
 
-// Returns `text` in quotes, escaped.
+// Returns `text` in quotes, escaped, with U+FFFD in place of bytes that are not UTF-8.
 std::string QuoteJson(std::string_view text);
 
 // Returns an array of values that are already JSON.

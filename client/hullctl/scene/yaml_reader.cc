@@ -2,6 +2,7 @@
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
+#include <yaml-cpp/depthguard.h>
 #include <yaml-cpp/eventhandler.h>
 
 #include <algorithm>
@@ -63,6 +64,10 @@ absl::StatusOr<YamlReader> YamlReader::Parse(const std::string& text, const std:
     return absl::InvalidArgumentError(absl::StrCat(
         name, ": more than ", kMaxSceneBytes, " bytes; write a larger scene as packedPlacements"));
   }
+  if (!IsUtf8(text)) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(name, ": is not UTF-8 text; convert it first: iconv -f ISO-8859-1 -t UTF-8"));
+  }
   // Parses at most two documents: for text such as ",", yaml-cpp 0.7 never stops finding
   // documents.
   YAML::Node root;
@@ -73,6 +78,9 @@ absl::StatusOr<YamlReader> YamlReader::Parse(const std::string& text, const std:
     YAML::Parser parser(input);
     while (documents < 2 && parser.HandleNextDocument(last)) ++documents;
     if (documents == 1) root = YAML::Load(text);
+  } catch (const YAML::DeepRecursion& problem) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(PlaceText(name, problem.mark), ": nested too deeply"));
   } catch (const YAML::Exception& problem) {
     return absl::InvalidArgumentError(absl::StrCat(
         PlaceText(name, problem.mark), ": not valid YAML: ", problem.msg, TabAdvice(text)));

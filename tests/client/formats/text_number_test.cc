@@ -145,6 +145,8 @@ TEST(JsonProblem, IsOneLine) {
             "Expected : between key:value pair at \"1}\"");
   EXPECT_EQ(JsonProblem("Unexpected end of string. Expected a value.\n{\n ^"),
             "Unexpected end of string. Expected a value at the end");
+  EXPECT_EQ(JsonProblem("JSON transcoder produced invalid protobuf output."),
+            "objects or arrays are nested too deeply");
   EXPECT_EQ(JsonProblem("pair: Cannot find field."), "the message has no field \"pair\"");
   EXPECT_EQ(JsonProblem("(placements[0]) hullID: Cannot find field."),
             "placements[0] has no field \"hullID\"");

@@ -113,6 +113,23 @@ TEST_F(HullctlTest, MistakesOnTheCommandLineExitWithTwo) {
   }
 }
 
+// No message can contain them: protobuf printed an error, and the server refused the call.
+TEST_F(HullctlTest, IdsMustBeUtf8) {
+  for (const std::vector<std::string>& arguments :
+       std::vector<std::vector<std::string>>{{"get", "caf\xE9"},
+                                             {"create", "caf\xE9"},
+                                             {"delete", "a", "caf\xE9"},
+                                             {"list", "caf\xE9"},
+                                             {"check", "a", "caf\xE9"},
+                                             {"body", "put", "b", "caf\xE9"}}) {
+    const Ran ran = Ask(arguments);
+    EXPECT_EQ(ran.code, 2) << testing::PrintToString(arguments);
+    EXPECT_THAT(ran.err, HasSubstr("\"caf?\" is not UTF-8\n")) << testing::PrintToString(arguments);
+  }
+  const TempFile file("caf\xE9.xyz", "0 0 0\n");
+  EXPECT_EQ(Ask({"append", "a", file.path(), "--create"}).code, 0);
+}
+
 TEST_F(HullctlTest, AMistypedWordGetsASuggestion) {
   const auto error = [](const std::vector<std::string>& arguments) {
     const Ran ran = RunTool(arguments);
@@ -426,6 +443,8 @@ TEST_F(HullctlTest, EveryJsonOutputIsValid) {
   EXPECT_EQ(MessagesIn<v1::GetStatusResponse>(AskJson({"status"}).out).size(), 1u);
   Json(AskJson({"delete", "b"}));
   EXPECT_EQ(QuoteJson("a\"b\\c\n\x01"), "\"a\\\"b\\\\c\\u000a\\u0001\"");
+  // A name in Latin-1 made the output invalid.
+  EXPECT_EQ(QuoteJson("caf\xE9 \xE2\x82\xAC"), "\"caf\xEF\xBF\xBD \xE2\x82\xAC\"");
 }
 
 TEST_F(HullctlTest, GetShowsProperties) {

@@ -221,12 +221,13 @@ TEST(YamlScene, ErrorsNameLineColumnAndKey) {
       {",", "a second document"},
       {"[1, 2]", "the scene is not a mapping"},
       {"&a [*a]", "the scene is not a mapping"},
+      {"hulls: {\xE9: {box: [1, 1, 1]}}", "cell.yaml: is not UTF-8 text; convert it first: iconv"},
   };
   for (const auto& [text, error] : cases) {
     EXPECT_THAT(ErrorOf(text), StartsWith("cell.yaml:")) << text;
     EXPECT_THAT(ErrorOf(text), HasSubstr(error)) << text;
   }
-  EXPECT_THAT(ErrorOf(std::string(100000, '[')), HasSubstr("not valid YAML"));
+  EXPECT_THAT(ErrorOf(std::string(100000, '[')), HasSubstr("nested too deeply"));
   EXPECT_THAT(ErrorOf("place:\n  a: {id: x}\n\tb: {id: x}\n"),
               HasSubstr("; line 3 starts with a tab; indent with spaces"));
 }
