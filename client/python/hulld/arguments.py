@@ -100,6 +100,19 @@ def text(value: Any, name: str, *, least: int = 0) -> str:
         raise ValueError(
             f"{name} has {len(value)} characters; at most {_MAX_ID_CHARACTERS} are allowed"
         )
+    try:
+        value.encode()
+    except UnicodeEncodeError:
+        raise ValueError(f"{name} is {value!r}, which is not Unicode text") from None
+    return value
+
+
+def header(value: Any, name: str) -> Any:
+    """The header of an answer."""
+    if not (hasattr(value, "store_id") and hasattr(value, "revision")):
+        raise TypeError(f"{name} is {value!r}; it must be the header of an answer")
+    text(value.store_id, f"{name}.store_id")
+    count(value.revision, f"{name}.revision", most=_MAX_UINT64)
     return value
 
 

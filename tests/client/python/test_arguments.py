@@ -306,6 +306,39 @@ def test_groups_and_counts_are_checked(silent: Any) -> None:
             call()
 
 
+@pytest.mark.parametrize(
+    ("header", "message"),
+    [
+        (hulld.Header("store", -1), "revision is -1"),
+        (hulld.Header("store", 2**64), "revision is 18446744073709551616"),
+        (hulld.Header("store", "7"), "revision is '7'"),  # type: ignore[arg-type]
+        (hulld.Header("\udcff", 7), "which is not Unicode text"),
+        (7, "7; it must be the header of an answer"),
+    ],
+)
+def test_headers_are_checked(silent: Any, header: Any, message: str) -> None:
+    with pytest.raises((ValueError, TypeError), match="after.*" + message):
+        next(silent.watch_hulls(after=header))
+    with pytest.raises((ValueError, TypeError), match="at_least.*" + message):
+        hulld.Freshness(at_least=header)
+
+
+def test_text_is_unicode(silent: Any) -> None:
+    for name, call in (
+        ("prefix", lambda: list(silent.list_hulls("\udcff"))),
+        ("prefix", lambda: next(silent.watch_hulls("\udcff"))),
+        ("writer_id", lambda: silent.open_append("a", writer_id="\udcff")),
+    ):
+        with pytest.raises(ValueError, match=name + r" is '\\udcff', which is not Unicode text"):
+            call()
+
+
+def test_placements_are_a_list(silent: Any) -> None:
+    for bad in (None, 7):
+        with pytest.raises(TypeError, match=f"placements is {bad}; it must be a list"):
+            silent.check_collisions(bad)
+
+
 @pytest.mark.parametrize("bad", [-1, float("nan"), float("inf"), 1e300, "1", True])
 def test_times_are_finite_and_not_negative(silent: Any, bad: Any) -> None:
     for call in (

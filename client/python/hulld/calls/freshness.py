@@ -34,6 +34,8 @@ class Freshness:
 
     def __post_init__(self) -> None:
         arguments.seconds(self.max_staleness, "max_staleness")
+        if self.at_least is not None:
+            arguments.header(self.at_least, "at_least")
 
     def message(self) -> Any:
         """The contract's Freshness."""

@@ -237,6 +237,8 @@ def delete_body(body_id: str, if_revision: int | None) -> Call[Header]:
 def watch_hulls(
     prefix: str, hull_id: str | None, with_bodies: bool, after: Header | None
 ) -> Call[HullChanges]:
+    if after is not None:
+        arguments.header(after, "after")
     request = hull_pb2.WatchHullsRequest(
         prefix=arguments.text(prefix, "prefix"),
         hull_id="" if hull_id is None else arguments.hull_id(hull_id),

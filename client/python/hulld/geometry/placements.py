@@ -190,7 +190,9 @@ class Placements:
                 f"{placements!r} is one ID; pass a list of placements, or "
                 f"Placements({placements!r}, poses)"
             )
-        single = [as_placement(placement) for placement in placements]  # type: ignore[union-attr]
+        if not isinstance(placements, Iterable):
+            raise TypeError(f"placements is {placements!r}; it must be a list of placements")
+        single = [as_placement(placement) for placement in placements]
         places: dict[str, int] = {}
         for placement in single:
             if placement.id is not None:
