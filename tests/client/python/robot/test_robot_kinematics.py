@@ -202,7 +202,11 @@ def test_configurations_are_checked(write: Write) -> None:
             '<box size="1 1 1"/><sphere radius="1"/>',
             "2: <geometry> contains several shapes",
         ),
-        ("<geometry><box", '<origin rot="1 0 0"/><geometry><box', "<origin> has no attribute 'rot'"),
+        (
+            "<geometry><box",
+            '<origin rot="1 0 0"/><geometry><box',
+            "<origin> has no attribute 'rot'",
+        ),
         (
             "<geometry><box",
             '<origin rpy="0 0 0" quat_xyzw="0 0 0 1"/><geometry><box',
