@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <optional>
 #include <span>
 #include <string_view>
@@ -159,10 +160,11 @@ class UrdfReader {
       }
       const auto q = NumbersOf(document_, origin, "quat_xyzw", 4);
       if (!q.ok()) return q.status();
-      *pose = Normalized((*q)[0], (*q)[1], (*q)[2], (*q)[3]);
-      if (!std::isfinite((*pose)[0])) {
+      const double squared = std::inner_product(q->begin(), q->end(), q->begin(), 0.0);
+      if (!(squared > 0 && std::isfinite(squared))) {
         return document_.ErrorAt(origin, "<origin> quat_xyzw is not a unit quaternion");
       }
+      *pose = Normalized((*q)[0], (*q)[1], (*q)[2], (*q)[3]);
     }
     if (!origin.attribute("xyz")) return absl::OkStatus();
     const auto xyz = NumbersOf(document_, origin, "xyz", 3);

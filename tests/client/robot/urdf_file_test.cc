@@ -131,6 +131,8 @@ TEST(UrdfFile, ErrorsNameLineAndElement) {
        "arm.urdf:5: <origin> has both rpy and quat_xyzw; remove one"},
       {{"<geometry><box", "<origin quat_xyzw=\"0 0 0 0\"/><geometry><box"},
        "arm.urdf:5: <origin> quat_xyzw is not a unit quaternion"},
+      {{"<geometry><box", "<origin quat_xyzw=\"0 0 1e200 0\"/><geometry><box"},
+       "arm.urdf:5: <origin> quat_xyzw is not a unit quaternion"},
       {{"<geometry><box", "<geometry><sphere radius=\"1\"/><box"},
        "arm.urdf:5: <geometry> contains several shapes; write one <collision> for each"},
       {{"<box size=\"2 2 1\"/>", "<cone/>"}, "arm.urdf:5: <geometry> contains \"cone\""},
