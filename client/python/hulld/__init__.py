@@ -110,7 +110,7 @@ if TYPE_CHECKING:
     from hulld.local_server import Local, LocalServer, check, local
     from hulld.programs import find_program
     from hulld.retry import RetryPolicy
-    from hulld.robot.answers import MotionCheck, MotionContact, RobotCheck
+    from hulld.robot.answers import RobotCheck
     from hulld.robot.robot import Robot
     from hulld.verification import VerificationError, Verifier
     from hulld.watches import CollisionWatch, HullWatch
@@ -177,8 +177,6 @@ __all__ = [
     "Local",
     "LocalServer",
     "Method",
-    "MotionCheck",
-    "MotionContact",
     "Normal",
     "NotFoundError",
     "Opened",
