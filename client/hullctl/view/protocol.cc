@@ -13,6 +13,7 @@
 #include "client/formats/text_number.h"
 #include "client/hullctl/printing/json.h"
 #include "client/packed_placements.h"
+#include "client/pose/rigid_pose.h"
 
 namespace hulld {
 namespace {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
@@ -12,7 +13,7 @@ import numpy.typing as npt
 
 from hulld.notebook import Viewer
 from hulld.v1 import hull_pb2
-from hulld.wire import Unsigned, named_arrays, named_fields
+from hulld.wire import named_arrays, named_fields
 
 
 @dataclass(frozen=True)
@@ -400,20 +401,17 @@ class MeshAssembly:
     def __init__(self, viewer: Viewer | None) -> None:
         self._viewer = viewer
         self._header: Any = None
-        self._xyz: list[npt.NDArray[np.float64]] = []
-        self._sizes: list[Unsigned] = []
-        self._indices: list[Unsigned] = []
+        self._arrays: defaultdict[str, list[npt.NDArray[Any]]] = defaultdict(list)
 
     def add(self, data: bytes) -> None:
         """ValueError: the message is of an unknown kind."""
-        arrays = {"xyz": self._xyz, "sizes": self._sizes, "indices": self._indices}
         for part, value in named_fields(hull_pb2.GetHullMeshResponse, data):
             if part == "header":
                 self._header = hull_pb2.MeshHeader.FromString(bytes(value))
                 return
             kind = hull_pb2.MeshVertices if part == "vertices" else hull_pb2.MeshFacets
             for name, array in named_arrays(kind, value):
-                arrays[name].append(array)
+                self._arrays[name].append(array)
             return
         raise ValueError("the mesh stream contains a message of an unknown kind")
 
@@ -422,10 +420,10 @@ class MeshAssembly:
         if self._header is None:
             raise ValueError("the mesh stream ended without a header")
         head = self._header
-        vertices = np.concatenate([np.empty(0), *self._xyz]).reshape(-1, 3)
+        vertices = np.concatenate([np.empty(0), *self._arrays["xyz"]]).reshape(-1, 3)
         sizes, indices = (
-            np.concatenate([np.empty(0, np.uint32), *(part.astype(np.uint32) for part in parts)])
-            for parts in (self._sizes, self._indices)
+            np.concatenate([np.empty(0), *self._arrays[name]]).astype(np.uint32)
+            for name in ("sizes", "indices")
         )
         if len(vertices) != head.vertex_count or len(sizes) != head.facet_count:
             raise ValueError("the mesh stream ended early, or the counts of its header are wrong")
