@@ -80,10 +80,10 @@ class Client(ClientBase):
     Calls raise HulldError (see hulld.errors) if the server refuses them or cannot be reached, and
     ValueError or TypeError if an argument is wrong, before anything is sent. All are safe to repeat
     except delete_hull, delete_body, create_hull without if_absent, put_body with if_revision,
-    replace_hull, save_backup, and collision streams; these are sent only once. Numbers are never
-    changed in transit: the server receives the doubles of an array, and answers contain the doubles
-    that it sent. orthogonality_tolerance, in calls with poses: the largest entry of R Rᵀ - I that
-    is accepted in a matrix; float32 matrices need 1e-6.
+    replace_hull, and collision streams; these are sent only once. Numbers are never changed in
+    transit: the server receives the doubles of an array, and answers contain the doubles that it
+    sent. orthogonality_tolerance, in calls with poses: the largest entry of R Rᵀ - I that is
+    accepted in a matrix; float32 matrices need 1e-6.
 
     A process that is forked while a client is open cannot make any calls.
     """
