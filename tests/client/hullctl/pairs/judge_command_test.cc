@@ -172,6 +172,7 @@ TEST_F(Judge, ErrorsNameLineAndColumn) {
   error("a,b,b_to_x,contact_time\ncube,cube,1,1.5\n", "1.5 is not a time from 0 to 1");
   error("a,b,b_to_x,contact_time\ncube,cube,,0.5\n", "contact_time needs a motion");
   error("a,b,b_to_x,distance\ncube,cube,1,0.5\n", "distance and depth apply only to pairs at rest");
+  error("a,b,us,distance\ncube,cube,-1,0.5\n", "us: -1 is not a duration of at least 0");
 }
 
 // Cubes approach along x by 2 from gaps of 1 and of 3.
