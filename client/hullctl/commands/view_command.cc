@@ -38,7 +38,6 @@ struct ViewArguments {
   std::string scene;
   uint16_t port = 0;
   bool no_open = false;
-  bool edit = false;
   // A recorded watch.
   std::string recording;
   std::string html_file;
@@ -118,7 +117,7 @@ class Viewing {
   Viewing(const Invocation& run, const ViewArguments& arguments)
       : run_(run),
         arguments_(arguments),
-        program_{run.MakeClient(), run.server, Up(arguments), arguments.edit, {}, {}},
+        program_{run.MakeClient(), run.server, Up(arguments), {}, {}},
         temporary_(program_.client) {}
 
   ExitCode Run() {
@@ -348,9 +347,6 @@ ExitCode View(const Invocation& run, const ViewArguments& arguments) {
   if (files == 2) {
     return run.FailUsage("--html and --png cannot be combined");
   }
-  if (files == 1 && arguments.edit) {
-    return run.FailUsage("--edit cannot be combined with --html or --png");
-  }
   const bool is_temporary =
       arguments.demo || (!arguments.things.empty() && scene.empty() &&
                          std::ranges::all_of(arguments.things, [](const std::string& thing) {
@@ -420,8 +416,6 @@ void AddViewCommand(Command program, Invocation* invocation) {
   };
   command.AddParsed("--size", take_size, "Pixels of --png (default 1600x1000)")
       .ValueName("WIDTHxHEIGHT");
-  command.AddFlag("--edit", &arguments->edit,
-                  "Let the page append points to hulls and delete them");
   command
       .AddText("--recording", &arguments->recording,
                "Play a recorded watch: the output of 'hullctl watch --output json'")
@@ -434,10 +428,11 @@ void AddViewCommand(Command program, Invocation* invocation) {
   command.SetDetails(
       "A body is dragged as a whole; the hulls of its pieces are shown on their own only if\n"
       "named. The page queries hulld through hullctl: it never sees your token, and cannot change\n"
-      "the server unless --edit is given. Files alone and --demo need no server: hullctl starts a\n"
-      "private one, which ends with the viewer. Files shown next to hulls of a server are not\n"
-      "stored there: each query carries the vertices of their hulls, at most 4096. Press ? on the\n"
-      "page to list its keys. --png runs chromium or another browser that is based on it.\n"
+      "the server. Files alone and --demo need no server: hullctl starts a private one, which "
+      "ends\n"
+      "with the viewer. Files shown next to hulls of a server are not stored there: each query\n"
+      "carries the vertices of their hulls, at most 4096. Press ? on the page to list its keys.\n"
+      "--png runs chromium or another browser that is based on it.\n"
       "\n"
       "A scene is YAML or JSON, as for 'hullctl scene'; --local also creates its hulls and\n"
       "bodies. If placements move ('to'), a slider plays the motion and marks the first contact\n"

@@ -44,23 +44,51 @@ std::string FrameFor(const Client& client, const ShapeFiles& files, const ShapeR
 }
 
 GeometryFeed::GeometryFeed(const Client& client, std::shared_ptr<PageChannel> page)
-    : files_(std::make_shared<ShapeFiles>()),
-      page_(std::move(page)),
-      worker_(kMaxShapes, [&client, this](const Order& order) {
-        return page_->SendBinary(FrameFor(client, *order.files, order.shape));
-      }) {}
+    : client_(client), page_(std::move(page)), thread_([this] { Run(); }) {}
+
+GeometryFeed::~GeometryFeed() {
+  {
+    const std::lock_guard lock(mutex_);
+    ended_ = true;
+  }
+  changed_.notify_all();
+  thread_.join();
+}
 
 void GeometryFeed::Show(const ShapeFiles& files) {
   const std::lock_guard lock(mutex_);
   files_ = std::make_shared<ShapeFiles>(files);
-  worker_.Forget();
+  waiting_.clear();
 }
 
 void GeometryFeed::Ask(const std::vector<ShapeRequest>& shapes) {
-  const std::lock_guard lock(mutex_);
-  for (const ShapeRequest& shape : shapes) {
-    if (worker_.Ask({shape, files_})) continue;
+  std::vector<ShapeRequest> refused;
+  {
+    const std::lock_guard lock(mutex_);
+    for (const ShapeRequest& shape : shapes) {
+      if (waiting_.size() < kMaxShapes) {
+        waiting_.push_back(shape);
+      } else {
+        refused.push_back(shape);
+      }
+    }
+  }
+  changed_.notify_all();
+  for (const ShapeRequest& shape : refused) {
     page_->SendBinary(MissingFrame(shape, "too many shapes are waiting to be sent"));
+  }
+}
+
+void GeometryFeed::Run() {
+  while (true) {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [this] { return !waiting_.empty() || ended_; });
+    if (ended_) return;
+    const ShapeRequest shape = std::move(waiting_.front());
+    waiting_.pop_front();
+    const std::shared_ptr<const ShapeFiles> files = files_;
+    lock.unlock();
+    if (!page_->SendBinary(FrameFor(client_, *files, shape))) return;
   }
 }
 

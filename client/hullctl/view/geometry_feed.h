@@ -1,14 +1,16 @@
 #ifndef HULLD_CLIENT_HULLCTL_VIEW_GEOMETRY_FEED_H_
 #define HULLD_CLIENT_HULLCTL_VIEW_GEOMETRY_FEED_H_
 
+#include <condition_variable>
+#include <deque>
 #include <memory>
 #include <mutex>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "client/client.h"
 #include "client/hullctl/view/bridge/bridge.h"
-#include "client/hullctl/view/ordered_worker.h"
 #include "client/hullctl/view/protocol.h"
 #include "client/hullctl/view/view_scene.h"
 
@@ -20,24 +22,27 @@ using ShapeFiles = std::vector<std::shared_ptr<const FileShape>>;
 class GeometryFeed {
  public:
   GeometryFeed(const Client& client, std::shared_ptr<PageChannel> page);
+  // Waits for the shape in flight; drops pending requests.
+  ~GeometryFeed();
+  GeometryFeed(const GeometryFeed&) = delete;
+  GeometryFeed& operator=(const GeometryFeed&) = delete;
 
   // Switches to another scene; drops pending requests.
   void Show(const ShapeFiles& files);
   void Ask(const std::vector<ShapeRequest>& shapes);
 
  private:
-  struct Order {
-    ShapeRequest shape;
-    // Files of the scene of the request.
-    std::shared_ptr<const ShapeFiles> files;
-  };
+  void Run();
 
-  std::mutex mutex_;
-  // Guarded by the mutex.
-  std::shared_ptr<const ShapeFiles> files_;
+  const Client& client_;
   const std::shared_ptr<PageChannel> page_;
-  // Its destructor waits for the shape in flight.
-  OrderedWorker<Order> worker_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  // Guarded by the mutex: the files of the scene, and the pending requests.
+  std::shared_ptr<const ShapeFiles> files_ = std::make_shared<ShapeFiles>();
+  std::deque<ShapeRequest> waiting_;
+  bool ended_ = false;
+  std::thread thread_;
 };
 
 // Returns the frame for a request. For a body, `pieces`, unless null, receives the IDs of its

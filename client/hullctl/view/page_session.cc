@@ -49,7 +49,6 @@ std::string HelloMessage(const ViewProgram& program) {
   return TextMessage("hello", {{"server", QuoteJson(program.server)},
                                {"version", QuoteJson(HULLD_VERSION)},
                                {"up", QuoteJson(program.up)},
-                               {"edit", program.edit ? "true" : "false"},
                                {"scenes", scenes + "]"}});
 }
 
@@ -57,8 +56,7 @@ PageSession::PageSession(const ViewProgram& program, std::shared_ptr<PageChannel
     : program_(program),
       page_(std::move(page)),
       answers_(program.client, page_),
-      geometry_(program.client, page_),
-      edits_(program.edit ? std::make_unique<EditFeed>(program.client, page_) : nullptr) {
+      geometry_(program.client, page_) {
   page_->SendText(HelloMessage(program_));
   Show(program_.scenes.front().key);
 }
@@ -66,7 +64,7 @@ PageSession::PageSession(const ViewProgram& program, std::shared_ptr<PageChannel
 PageSession::~PageSession() = default;
 
 void PageSession::OnMessage(std::string_view json) {
-  auto message = ParsePageMessage(json);
+  const auto message = ParsePageMessage(json);
   if (!message.ok()) {
     page_->SendText(ProblemMessage(absl::StrCat("The bridge cannot read a message from the page: ",
                                                 message.status().message())));
@@ -79,7 +77,6 @@ void PageSession::OnMessage(std::string_view json) {
   }
   if (message->query) answers_.Ask(*message->query);
   if (message->joints) MoveJoints(*message->joints);
-  if (message->edit) Edit(*std::move(message->edit));
 }
 
 void PageSession::MoveJoints(const ViewConfiguration& configuration) {
@@ -96,22 +93,6 @@ void PageSession::MoveJoints(const ViewConfiguration& configuration) {
   page_->SendText(poses.ok() ? TextMessage("poses", {{"scene", std::to_string(configuration.scene)},
                                                      {"poses", PosesJson(*poses)}})
                              : ProblemMessage(std::string(poses.status().message())));
-}
-
-void PageSession::Edit(ViewEdit edit) {
-  if (edits_ == nullptr) {
-    page_->SendText(ProblemMessage(
-        "This page is read-only; to edit hulls, restart with 'hullctl view --edit'."));
-    return;
-  }
-  {
-    const std::lock_guard lock(mutex_);
-    if (!known_.contains(edit.hull_id)) {
-      page_->SendText(ProblemMessage("The hull \"" + edit.hull_id + "\" is not shown."));
-      return;
-    }
-  }
-  edits_->Ask(std::move(edit));
 }
 
 void PageSession::Show(const std::string& key) {

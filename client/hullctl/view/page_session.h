@@ -12,7 +12,6 @@
 #include "client/client.h"
 #include "client/hullctl/view/answer_feed.h"
 #include "client/hullctl/view/bridge/bridge.h"
-#include "client/hullctl/view/edit_feed.h"
 #include "client/hullctl/view/geometry_feed.h"
 #include "client/hullctl/view/hull_follower.h"
 #include "client/hullctl/view/protocol.h"
@@ -26,8 +25,6 @@ struct ViewProgram {
   std::string server;
   // "x", "y", or "z".
   std::string up;
-  // True if pages may change hulls.
-  bool edit = false;
   // At least one; pages start with the first.
   std::vector<ViewScene> scenes;
   // Receives the key of each scene that a page starts to show; may be empty.
@@ -46,7 +43,6 @@ class PageSession final : public PageHandler {
 
  private:
   void Show(const std::string& key);
-  void Edit(ViewEdit edit);
   void MoveJoints(const ViewConfiguration& configuration);
   // Also follows these pieces of bodies from now on.
   void WidenWatch(const std::vector<ShapeRequest>& shapes);
@@ -59,8 +55,6 @@ class PageSession final : public PageHandler {
   const std::shared_ptr<PageChannel> page_;
   AnswerFeed answers_;
   GeometryFeed geometry_;
-  // Null unless pages may change hulls.
-  const std::unique_ptr<EditFeed> edits_;
 
   std::mutex mutex_;
   // Guarded by the mutex: the number of the current scene, and its known IDs.

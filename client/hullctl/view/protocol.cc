@@ -13,6 +13,7 @@
 #include "client/formats/text_number.h"
 #include "client/hullctl/printing/json.h"
 #include "client/packed_placements.h"
+#include "client/pose/rigid_pose.h"
 
 namespace hulld {
 namespace {
@@ -143,28 +144,6 @@ ViewConfiguration ReadConfiguration(Reader* reader) {
   return configuration;
 }
 
-ViewEdit ReadEdit(Reader* reader) {
-  ViewEdit edit;
-  const std::string action = reader->Text("action");
-  if (action != "append" && action != "delete") {
-    reader->Complain("action", "is neither append nor delete");
-  }
-  if (action == "delete") edit.action = ViewEdit::Action::kDelete;
-  edit.hull_id = reader->Text("hullId");
-  for (const Value& number : reader->List("points").values()) {
-    if (number.kind_case() != Value::kNumberValue) {
-      reader->Complain("points", "contains a value that is not a number");
-      return edit;
-    }
-    edit.points.push_back(number.number_value());
-  }
-  const bool is_append = edit.action == ViewEdit::Action::kAppend;
-  if (edit.points.size() % 3 != 0 || edit.points.empty() == is_append) {
-    reader->Complain("points", "needs three numbers for each point to append");
-  }
-  return edit;
-}
-
 template <typename Number>
 void AppendBytes(const std::vector<Number>& numbers, std::string* frame) {
   frame->append(reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(Number));
@@ -212,8 +191,6 @@ absl::StatusOr<PageMessage> ParsePageMessage(std::string_view json) {
     message.geometry.push_back(ReadSimplification(&reader));
   } else if (type == "query") {
     message.query = ReadQuery(&reader);
-  } else if (type == "edit") {
-    message.edit = ReadEdit(&reader);
   } else if (type == "joints") {
     message.joints = ReadConfiguration(&reader);
   } else {

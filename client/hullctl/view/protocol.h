@@ -33,15 +33,11 @@ namespace hulld {
 //              or none), the scene's tolerance, true if the pair's certificate is wanted, and true
 //              if nothing moves now. A new query replaces the pending one and keeps its poses.
 //              `answer`, `motion`, and `collisions` answer it.
-//   edit       {action: "append"|"delete", hullId, points}: changes a hull; `points` are three
-//              numbers each. Refused unless `hello` permits it. `edited` answers it; pending edits
-//              of a hull may share an answer.
 //   joints     {scene, values, waypoint}: moves the joints of the scene; waypoint: the index of the
 //              waypoint with these values, or null. `poses` answers it.
 //
 // The bridge to the page:
-//   hello      {server, version, up, edit, scenes: [{key, title}]}, first; edit: true if the page
-//              may change hulls.
+//   hello      {server, version, up, scenes: [{key, title}]}, first.
 //   scene      {number, key, title, note, files: [{name}], objects: [OBJECT], joints: [{name, low,
 //              high, value}], waypoints: [values], contacts, named, watch}: replaces all previous
 //              content.
@@ -69,7 +65,6 @@ namespace hulld {
 //   collisions {update, revision, pairs: [[a, b, relation]], problems: [text], totals}: all pairs
 //              of the scene that collide (FindCollisions), or all named pairs that do, a < b.
 //   poses      {scene, poses}: of all jointed objects, seven numbers each.
-//   edited     {hullId, done, message}: result of an edit; message is for people.
 //   problem    {message}: an error, for people.
 //
 // A frame is, little-endian: the length of its head (uint32), its head (JSON), zeros up to a
@@ -105,13 +100,6 @@ struct ShapeRequest {
   std::optional<uint32_t> file;
   std::optional<v1::GetHullMeshRequest> simplified;
 };
-struct ViewEdit {
-  enum class Action { kAppend, kDelete };
-  Action action = Action::kAppend;
-  std::string hull_id;
-  // Points to append, n x 3.
-  std::vector<double> points;
-};
 struct ViewConfiguration {
   uint64_t scene = 0;
   std::vector<double> values;
@@ -120,7 +108,6 @@ struct PageMessage {
   std::optional<std::string> show;
   std::vector<ShapeRequest> geometry;
   std::optional<ViewQuery> query;
-  std::optional<ViewEdit> edit;
   std::optional<ViewConfiguration> joints;
 };
 

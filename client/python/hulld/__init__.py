@@ -31,7 +31,6 @@ if TYPE_CHECKING:
         Axis,
         AxisKind,
         Batch,
-        BatchPart,
         Certificate,
         Collision,
         CollisionChanges,
@@ -49,7 +48,6 @@ if TYPE_CHECKING:
         Relation,
         Rung,
         Scene,
-        ScenePart,
         SceneTotals,
         SeparatedInterval,
         Separation,
@@ -72,16 +70,11 @@ if TYPE_CHECKING:
         HullInfo,
         HullMesh,
         HullProperties,
-        MeshFacets,
-        MeshHeader,
-        MeshPart,
-        MeshVertices,
         PointCounts,
         ReplacedHull,
     )
     from hulld.answers.status import Limits, ServerStatus
     from hulld.appender import Appender
-    from hulld.backup import Backup
     from hulld.calls.append_state import Appended, Opened
     from hulld.calls.freshness import Freshness
     from hulld.client import Client
@@ -117,7 +110,7 @@ if TYPE_CHECKING:
     from hulld.local_server import Local, LocalServer, check, local
     from hulld.programs import find_program
     from hulld.retry import RetryPolicy
-    from hulld.robot.answers import MotionCheck, MotionContact, RobotCheck
+    from hulld.robot.answers import RobotCheck
     from hulld.robot.robot import Robot
     from hulld.verification import VerificationError, Verifier
     from hulld.watches import CollisionWatch, HullWatch
@@ -140,9 +133,7 @@ __all__ = [
     "Audit",
     "Axis",
     "AxisKind",
-    "Backup",
     "Batch",
-    "BatchPart",
     "Body",
     "BodyInfo",
     "BoundedValue",
@@ -185,13 +176,7 @@ __all__ = [
     "Limits",
     "Local",
     "LocalServer",
-    "MeshFacets",
-    "MeshHeader",
-    "MeshPart",
-    "MeshVertices",
     "Method",
-    "MotionCheck",
-    "MotionContact",
     "Normal",
     "NotFoundError",
     "Opened",
@@ -216,7 +201,6 @@ __all__ = [
     "RobotCheck",
     "Rung",
     "Scene",
-    "ScenePart",
     "SceneTotals",
     "SeparatedInterval",
     "Separation",
@@ -251,7 +235,6 @@ _MODULES = (
     "answers.hulls",
     "answers.status",
     "appender",
-    "backup",
     "calls.append_state",
     "calls.freshness",
     "client",

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from hulld import arguments
 from hulld.answers.assembly import BatchAssembly, SceneAssembly
 from hulld.answers.bodies import Body, BodyInfo, ReplacedBody
-from hulld.answers.collisions import Batch, BatchPart, Collision, Method, Scene, ScenePart
+from hulld.answers.collisions import Batch, Collision, Method, Scene
 from hulld.answers.containment import (
     Containment,
     PointQuery,
@@ -27,13 +27,11 @@ from hulld.answers.hulls import (
     HullInfo,
     HullMesh,
     MeshAssembly,
-    MeshPart,
     ReplacedHull,
     decode_replaced,
 )
 from hulld.answers.status import ServerStatus
 from hulld.appender import Appender
-from hulld.backup import Backup, BackupWriter
 from hulld.calls import requests
 from hulld.calls.append_state import DEFAULT_CHUNK_BYTES, Appended, AppendState, pieces
 from hulld.calls.freshness import Freshness
@@ -43,7 +41,6 @@ from hulld.calls.transport import PointsSource, each, invoke, is_iterator
 from hulld.calls.wanted import Wanted
 from hulld.client_base import ClientBase
 from hulld.collision_stream import CollisionStream
-from hulld.connection import PathLike
 from hulld.errors import HulldError, error_class, read_answer
 from hulld.geometry.placements import (
     PlacementLike,
@@ -83,10 +80,10 @@ class Client(ClientBase):
     Calls raise HulldError (see hulld.errors) if the server refuses them or cannot be reached, and
     ValueError or TypeError if an argument is wrong, before anything is sent. All are safe to repeat
     except delete_hull, delete_body, create_hull without if_absent, put_body with if_revision,
-    replace_hull, save_backup, and collision streams; these are sent only once. Numbers are never
-    changed in transit: the server receives the doubles of an array, and answers contain the doubles
-    that it sent. orthogonality_tolerance, in calls with poses: the largest entry of R Rᵀ - I that
-    is accepted in a matrix; float32 matrices need 1e-6.
+    replace_hull, and collision streams; these are sent only once. Numbers are never changed in
+    transit: the server receives the doubles of an array, and answers contain the doubles that it
+    sent. orthogonality_tolerance, in calls with poses: the largest entry of R Rᵀ - I that is
+    accepted in a matrix; float32 matrices need 1e-6.
 
     A process that is forked while a client is open cannot make any calls.
     """
@@ -101,16 +98,6 @@ class Client(ClientBase):
         """True if the server reports that it is serving; needs no token. Not retried.
         UnavailableError: it cannot be reached."""
         return self._unary(requests.check_health(), timeout)
-
-    def save_backup(self, path: PathLike, *, timeout: float | None = None) -> Backup:
-        """Saves a consistent copy of the whole store to one file, for `hullctl backup restore`. The
-        file gets its final name only when it is complete and on disk. Unbounded in time unless
-        `timeout` is given; not retried. FailedPreconditionError: the store is in memory."""
-        seconds = arguments.seconds(timeout)
-        with BackupWriter(path) as writer:
-            for part in self._parts(requests.save_backup(), seconds):
-                read_answer(writer.write, part)
-            return read_answer(lambda _: writer.finish(), None)
 
     # --- Hulls ---
 
@@ -258,21 +245,6 @@ class Client(ClientBase):
         """
         call = requests.get_hull_mesh(hull_id, side, max_vertices, max_error)
         return self._whole(call, lambda: MeshAssembly(self._viewer), timeout, freshness)
-
-    def iter_hull_mesh(
-        self,
-        hull_id: str,
-        *,
-        side: Literal["inside", "outside"] | None = None,
-        max_vertices: int | None = None,
-        max_error: float | None = None,
-        freshness: Freshness | None = None,
-        timeout: float | None = None,
-    ) -> Iterator[MeshPart]:
-        """Yields the mesh in parts of about 1 MiB, as they arrive: MeshHeader, then MeshVertices,
-        then MeshFacets."""
-        call = requests.get_hull_mesh(hull_id, side, max_vertices, max_error)
-        return self._parts(call, self._seconds(timeout), freshness)
 
     def list_hulls(
         self,
@@ -482,46 +454,6 @@ class Client(ClientBase):
         call = requests.check_collisions(packed, asked, wanted, tolerance, method)
         return self._whole(call, lambda: BatchAssembly(asked, wanted), timeout, freshness)
 
-    def iter_check_collisions(
-        self,
-        placements: PlacementsLike,
-        pairs: npt.ArrayLike | None = None,
-        *,
-        axis: bool = False,
-        analysis: bool = False,
-        certificate: bool = False,
-        separation: bool = False,
-        max_error: float | None = None,
-        witness: bool = False,
-        normal: bool = False,
-        clearance: float | None = None,
-        max_time_error: float | None = None,
-        resolution: float | None = None,
-        tolerance: float = 0.0,
-        orthogonality_tolerance: float = ORTHOGONALITY_TOLERANCE,
-        method: Method = Method.UNSPECIFIED,
-        freshness: Freshness | None = None,
-        timeout: float | None = None,
-    ) -> Iterator[BatchPart]:
-        """Yields the answers in parts, as they arrive: ascending ranges that cover every pair
-        exactly once. Retried only before the first part."""
-        packed = Placements.of(placements, orthogonality_tolerance=orthogonality_tolerance)
-        asked = all_pairs(len(packed)) if pairs is None else as_pairs(pairs, len(packed))
-        wanted = Wanted(
-            axis,
-            analysis,
-            certificate,
-            separation,
-            max_error,
-            witness,
-            clearance,
-            normal,
-            max_time_error,
-            resolution,
-        )
-        call = requests.check_collisions(packed, asked, wanted, tolerance, method)
-        return self._parts(call, self._seconds(timeout), freshness)
-
     def contains(
         self,
         points: PointsLike,
@@ -659,53 +591,6 @@ class Client(ClientBase):
             packed, scene, wanted, limit, tolerance, first_only, every_piece
         )
         return self._whole(call, lambda: SceneAssembly(wanted), timeout, freshness)
-
-    def iter_find_collisions(
-        self,
-        placements: PlacementsLike,
-        *,
-        groups: npt.ArrayLike | None = None,
-        ignore_same_group: bool = False,
-        ignored_group_pairs: npt.ArrayLike | None = None,
-        movers: int | None = None,
-        axis: bool = False,
-        analysis: bool = False,
-        certificate: bool = False,
-        separation: bool = False,
-        max_error: float | None = None,
-        witness: bool = False,
-        normal: bool = False,
-        clearance: float | None = None,
-        max_time_error: float | None = None,
-        resolution: float | None = None,
-        limit: int | None = None,
-        first_only: bool = False,
-        every_piece: bool = False,
-        tolerance: float = 0.0,
-        orthogonality_tolerance: float = ORTHOGONALITY_TOLERANCE,
-        freshness: Freshness | None = None,
-        timeout: float | None = None,
-    ) -> Iterator[ScenePart]:
-        """Yields the answers in parts, as pairs are found, in ascending order. The last part
-        contains the totals. Retried only before the first part."""
-        packed = Placements.of(placements, orthogonality_tolerance=orthogonality_tolerance)
-        scene = SceneFilter(groups, ignore_same_group, ignored_group_pairs, movers)
-        wanted = Wanted(
-            axis,
-            analysis,
-            certificate,
-            separation,
-            max_error,
-            witness,
-            clearance,
-            normal,
-            max_time_error,
-            resolution,
-        ).for_limit(limit)
-        call = requests.find_collisions(
-            packed, scene, wanted, limit, tolerance, first_only, every_piece
-        )
-        return self._parts(call, self._seconds(timeout), freshness)
 
     def stream_collisions(
         self,

@@ -111,28 +111,6 @@ class ClientBase:
             if not token:
                 return
 
-    def _parts(
-        self, call: Call[T], timeout: float | None, freshness: Freshness | None = None
-    ) -> Iterator[T]:
-        """The decoded messages of an answer. Retried only before the first message."""
-        call = as_fresh(call, freshness)
-        attempts = Attempts(self._retry, call.safe_to_repeat, timeout)
-        received = False
-        while True:
-            stream = self._start(call, attempts.remaining())
-            try:
-                while (data := read(stream)) is not None:
-                    received = True
-                    yield read_answer(call.decode, data)
-                return
-            except HulldError as error:
-                if received:
-                    raise
-                failed = error
-            finally:
-                cancel_call(stream)
-            sleep(attempts.wait_after(failed))
-
     def _whole(
         self,
         call: Call[Any],

@@ -5,7 +5,6 @@ from __future__ import annotations
 import concurrent.futures
 import inspect
 import pathlib
-import subprocess
 import threading
 from typing import Any
 
@@ -198,7 +197,6 @@ def test_missing_hulls_are_named(either: Any, name: str) -> None:
         lambda: either.delete_hull(name),
         lambda: either.replace_hull(name, CUBE),
         lambda: either.check_collision(name, name),
-        lambda: list(either.iter_hull_mesh(name)),
     ):
         with pytest.raises(hulld.NotFoundError) as caught:
             call()
@@ -233,9 +231,6 @@ def test_a_mesh_has_vertices_facets_and_triangles(either: Any, name: str) -> Non
     triangles = mesh.vertices[mesh.triangles]
     # Counter-clockwise from outside: the signed volume is that of the cube.
     assert np.linalg.det(triangles - 0.5).sum() / 6 == pytest.approx(1)
-    parts = list(either.iter_hull_mesh(name))
-    assert isinstance(parts[0], hulld.MeshHeader) and parts[0].vertex_count == 8
-    assert sum(len(p.vertices) for p in parts if isinstance(p, hulld.MeshVertices)) == 8
 
 
 def test_a_mesh_of_many_messages_is_put_together(
@@ -243,7 +238,6 @@ def test_a_mesh_of_many_messages_is_put_together(
 ) -> None:
     points = ball(rng, 60000)
     put(either, name, points)
-    assert sum(isinstance(p, hulld.MeshVertices) for p in either.iter_hull_mesh(name)) > 1
     mesh = either.get_hull_mesh(name)
     assert {bytes(v) for v in mesh.vertices} == {bytes(p) for p in points}
     assert len(mesh.triangles) == 2 * len(points) - 4
@@ -383,14 +377,6 @@ def test_a_batch_of_many_messages_comes_in_order(
     gaps = np.abs(shifts[pairs[:, 0]] - shifts[pairs[:, 1]]).max(axis=1)
     expected = np.select([gaps == 0, gaps == 1], [3, 2], 1)
     np.testing.assert_array_equal(batch.answers.relations, expected)
-    parts = list(either.iter_check_collisions(placements, pairs, separation=True))
-    assert len(parts) > 1 and parts[0].header is not None
-    at = 0
-    for part in parts:
-        assert part.first_pair == at or len(part.answers) == 0
-        np.testing.assert_array_equal(part.answers.relations, expected[at : at + len(part.answers)])
-        at += len(part.answers)
-    assert at == len(pairs)
 
 
 def test_a_pair_without_an_answer_says_why(either: Any, name: str) -> None:
@@ -446,9 +432,6 @@ def test_a_scene_finds_what_a_batch_finds(either: Any, name: str, rng: np.random
     assert none.pairs.shape == (0, 2) and none.answers.separations.shape == (0,)
     near = either.find_collisions(placements, clearance=0.5)
     assert len(near.pairs) > len(scene.pairs) and near.answers.within_clearance.all()
-    parts = list(either.iter_find_collisions(placements))
-    assert parts[0].header is not None and len(parts[0].pairs) == 0 and parts[-1].totals is not None
-    np.testing.assert_array_equal(np.concatenate([part.pairs for part in parts]), scene.pairs)
 
 
 def test_a_stream_answers_what_moved(either: Any, name: str) -> None:
@@ -614,40 +597,6 @@ def test_many_threads_use_one_client(client: hulld.Client, name: str) -> None:
             pool.map(lambda x: client.check_collision(name, (name, (x, 0, 0))).relation, shifts)
         )
     assert found == [3] * 32 + [2] + [1] * 32
-
-
-# --- Backup ---
-
-
-def test_a_backup_is_what_hullctl_restores(connect: Any, tmp_path: pathlib.Path, name: str) -> None:
-    saved = tmp_path / "store.backup"
-    with hulld.LocalServer(data_dir=tmp_path / "hulls") as server:
-        client = connect(server.address)
-        put(client, name)
-        backup = client.save_backup(saved)
-        assert backup.file_count > 0 and backup.byte_count > 0
-        assert saved.stat().st_mode & 0o077 == 0
-    subprocess.run(
-        [
-            hulld.find_program("hullctl"),
-            "backup",
-            "restore",
-            saved,
-            "--data-dir",
-            tmp_path / "again",
-        ],
-        check=True,
-        capture_output=True,
-    )
-    with hulld.LocalServer(data_dir=tmp_path / "again") as server:
-        assert connect(server.address).get_hull(name).info.vertex_count == 8
-
-
-def test_a_backup_that_fails_leaves_no_file(either: Any, tmp_path: pathlib.Path) -> None:
-    with pytest.raises(hulld.FailedPreconditionError) as caught:
-        either.save_backup(tmp_path / "store.backup")
-    assert caught.value.reason == "STORE_IN_MEMORY"
-    assert list(tmp_path.iterdir()) == []
 
 
 # --- Rows, and short texts ---

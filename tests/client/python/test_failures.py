@@ -143,19 +143,10 @@ def test_a_mesh_that_breaks_off_is_read_again(caller: Any, fake: FakeHulld) -> N
     assert len(fake.calls) == 2
 
 
-def test_parts_that_were_given_out_are_not_repeated(caller: Any, fake: FakeHulld) -> None:
-    fake.script = [lambda context: None, unavailable]
-    parts = caller.iter_hull_mesh("a")
-    assert isinstance(next(parts), hulld.MeshHeader)
-    with pytest.raises(hulld.UnavailableError):
-        list(parts)
-    assert len(fake.calls) == 1
-
-
 def test_the_token_goes_with_every_call(connect: Any, fake: FakeHulld) -> None:
     client = connect(fake.address, token="secret", retry=QUICK)
     client.get_status()
-    list(client.iter_hull_mesh("a"))
+    client.get_hull_mesh("a")
     client.append_points("a", np.zeros((1, 3)), create=True)
     assert [m.get("authorization") for m in fake.metadata] == ["Bearer secret"] * 3
     assert "secret" not in repr(client)

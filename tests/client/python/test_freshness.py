@@ -67,15 +67,12 @@ def test_every_read_takes_it(either: Any) -> None:
     for read in (
         lambda f: client.get_hull("fresh/cube", freshness=f),
         lambda f: client.get_hull_mesh("fresh/cube", freshness=f),
-        lambda f: list(client.iter_hull_mesh("fresh/cube", freshness=f)),
         lambda f: list(client.list_hulls("fresh/", page_size=1, freshness=f)),
         lambda f: client.get_body("fresh/body", freshness=f),
         lambda f: list(client.list_bodies("fresh/", page_size=1, freshness=f)),
         lambda f: client.check_collision(*pair, freshness=f),
         lambda f: client.check_collisions(pair, freshness=f),
-        lambda f: list(client.iter_check_collisions(pair, freshness=f)),
         lambda f: client.find_collisions(pair, freshness=f),
-        lambda f: list(client.iter_find_collisions(pair, freshness=f)),
     ):
         read(fresh)
         with pytest.raises(hulld.FailedPreconditionError) as refused:

@@ -10,7 +10,14 @@ import pytest
 from hulld.geometry.placements import Placements
 from hulld.geometry.points import as_points, point_block
 from hulld.v1 import collision_pb2, geometry_pb2, hull_pb2
-from hulld.wire import MessageWriter, WireError, packed_doubles, packed_varints, read_fields
+from hulld.wire import (
+    MessageWriter,
+    WireError,
+    named_arrays,
+    packed_doubles,
+    packed_varints,
+    read_fields,
+)
 from hulld.wire.fields import encode_varints
 
 # Each length of a varint, and both sides of each step.
@@ -97,6 +104,23 @@ def test_fields_of_all_wire_types_are_found() -> None:
 def test_unpacked_fields_are_read_too() -> None:
     assert packed_varints(7).tolist() == [7]
     assert packed_doubles(memoryview(struct.pack("<d", 0.1))).tolist() == [0.1]
+
+
+def test_arrays_have_the_names_of_the_contract() -> None:
+    columns = collision_pb2.AnswerColumns(
+        relations=[1, 3], separations=HARD[:2], pieces=[-1, 200], axes=[collision_pb2.Axis(kind=2)]
+    )
+    # A field of a later version of the contract.
+    data = columns.SerializeToString() + b"\xf8\x3f\x01"
+    found = {name: np.asarray(value).tolist() for name, value in named_arrays(type(columns), data)}
+    assert found == {
+        "relations": [1, 3],
+        "separations": HARD[:2],
+        "pieces": [1, 400],
+        "axes": list(columns.axes[0].SerializeToString()),
+    }
+    with pytest.raises(WireError, match="axes is a number"):
+        list(named_arrays(type(columns), b"\x18\x01"))
 
 
 @pytest.mark.parametrize(

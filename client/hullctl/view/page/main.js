@@ -57,14 +57,12 @@ class Viewer {
         this.joints.failed();
         this.say(message.message);
       },
-      edited: (message) => this.edited(message),
       frame: (frame) => this.frame(frame),
       lost: () => this.lost(),
     });
     this.answerPanel = new AnswerPanel(this.model, this.marks, this.connection.live);
-    this.objectPanel = new ObjectPanel(
-        this.model, this.connection.live, (...wish) => this.simplify(...wish),
-        (edit) => this.connection.send({type: 'edit', ...edit}));
+    this.objectPanel =
+        new ObjectPanel(this.model, this.connection.live, (...wish) => this.simplify(...wish));
     this.timeLine = new TimeLine();
     this.joints = new Joints(this.model, this.connection);
     this.watch = new Watch(this.model);
@@ -143,9 +141,8 @@ class Viewer {
 
   // --- Messages ---
 
-  hello({server, version, up, edit, scenes}) {
+  hello({server, version, up, scenes}) {
     this.server = server;
-    this.objectPanel.mayEdit = edit && this.connection.live;
     this.stage.setUp(up);
     this.gizmo.handles.camera = this.stage.camera;
     const choice = $('scene-choice');
@@ -404,10 +401,6 @@ class Viewer {
     if (!this.isCurrent(message)) return;
     if (message.revision !== '0') this.updateStatus(message.revision);
     if (!this.watch.isOfPairs) this.model.setCollisions(message);
-  }
-
-  edited(message) {
-    if (!this.objectPanel.edited(message)) this.say(message.message);
   }
 
   lost() {

@@ -6,9 +6,10 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from hulld.answers.collision_messages import new_frame
+from hulld.answers.collision_messages import ColumnReader, Frame
 from hulld.answers.collisions import Batch, Scene, StreamAnswer
 from hulld.calls.wanted import Wanted
+from hulld.v1 import collision_pb2
 
 
 class BatchAssembly:
@@ -16,13 +17,13 @@ class BatchAssembly:
 
     def __init__(self, pairs: npt.NDArray[np.uint32], wanted: Wanted) -> None:
         self._pairs = pairs
-        self._frame = new_frame(wanted)
+        self._frame = Frame(ColumnReader(wanted))
 
     def add(self, data: bytes) -> None:
         """ValueError: the message does not follow the previous one."""
         before = self._frame.columns.rows
-        self._frame.read_batch(data)
-        if self._frame.columns.rows > before and self._frame.numbers.get(4, 0) != before:
+        self._frame.read(collision_pb2.BatchCheckCollisionsResponse, data)
+        if self._frame.columns.rows > before and self._frame.numbers.get("first_pair", 0) != before:
             raise ValueError("the batch's answers are out of order")
 
     def finish(self) -> Batch:
@@ -46,10 +47,10 @@ class SceneAssembly:
     """Assembles the answer to FindCollisions."""
 
     def __init__(self, wanted: Wanted) -> None:
-        self._frame = new_frame(wanted)
+        self._frame = Frame(ColumnReader(wanted))
 
     def add(self, data: bytes) -> None:
-        self._frame.read_scene(data)
+        self._frame.read(collision_pb2.FindCollisionsResponse, data)
 
     def finish(self) -> Scene:
         """ValueError: something is missing."""
@@ -74,15 +75,16 @@ class StepAssembly:
     def __init__(self, update: int, pairs: npt.NDArray[np.uint32], wanted: Wanted) -> None:
         self._update = update
         self._pairs = pairs
-        self._frame = new_frame(wanted)
+        self._frame = Frame(ColumnReader(wanted))
 
     def add(self, data: bytes) -> bool:
         """Returns true for the last message of the step. ValueError: the message belongs to another
         step."""
-        update, last = self._frame.read_stream(data)
+        self._frame.read(collision_pb2.StreamCollisionsResponse, data)
+        update = self._frame.numbers.get("update", 0)
         if update != self._update:
             raise ValueError(f"the server answered message {update}, not {self._update}")
-        return last
+        return bool(self._frame.numbers.get("last", 0))
 
     def finish(self) -> StreamAnswer:
         """ValueError: something is missing."""

@@ -3,6 +3,7 @@ array by array."""
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
@@ -15,7 +16,6 @@ from hulld.answers.collisions import (
     Answers,
     Axis,
     AxisKind,
-    BatchPart,
     Certificate,
     Collision,
     CollisionChanges,
@@ -31,7 +31,6 @@ from hulld.answers.collisions import (
     Problem,
     Relation,
     Rung,
-    ScenePart,
     SceneTotals,
     SeparatedInterval,
     Separation,
@@ -44,7 +43,7 @@ from hulld.errors import status_name
 from hulld.geometry.placements import Placements
 from hulld.notebook import Viewer
 from hulld.v1 import collision_pb2, error_pb2, geometry_pb2
-from hulld.wire import Unsigned, packed_doubles, packed_varints, read_fields
+from hulld.wire import Unsigned, named_arrays, named_fields, packed_varints
 
 T = TypeVar("T")
 
@@ -188,148 +187,111 @@ def decode_collision(data: bytes, query: Placements, viewer: Viewer | None) -> C
 
 # --- Columns ---
 
+#: The messages of columns with one message for each row.
+_MESSAGES: dict[str, tuple[Any, Callable[[Any], Any]]] = {
+    "axes": (collision_pb2.Axis, lambda message: _axis_of(message) if message.kind else None),
+    "analyses": (collision_pb2.Analysis, _analysis_of),
+    "certificates": (collision_pb2.Certificate, _certificate_of),
+}
 
-@dataclass
 class ColumnReader:
     """Collects the columns of messages into answers."""
 
-    wanted: Wanted
-    relations: list[Unsigned] = field(default_factory=list)
-    rungs: list[Unsigned] = field(default_factory=list)
-    axes: list[Axis | None] = field(default_factory=list)
-    analyses: list[Analysis | None] = field(default_factory=list)
-    certificates: list[Certificate | None] = field(default_factory=list)
-    separations: list[npt.NDArray[np.float64]] = field(default_factory=list)
-    separation_bounds: list[npt.NDArray[np.float64]] = field(default_factory=list)
-    witness_xyz: list[npt.NDArray[np.float64]] = field(default_factory=list)
-    witness_errors: list[npt.NDArray[np.float64]] = field(default_factory=list)
-    normal_xyz: list[npt.NDArray[np.float64]] = field(default_factory=list)
-    normal_angle_bounds: list[npt.NDArray[np.float64]] = field(default_factory=list)
-    within_clearance: list[Unsigned] = field(default_factory=list)
-    pieces: list[Unsigned] = field(default_factory=list)
-    problems: dict[int, Problem] = field(default_factory=dict)
-    piece_proofs: dict[int, tuple[PieceCertificate, ...]] = field(default_factory=dict)
-    separated_until: list[npt.NDArray[np.float64]] = field(default_factory=list)
-    contact_times: list[npt.NDArray[np.float64]] = field(default_factory=list)
-    motion_proofs: dict[int, tuple[SeparatedInterval, ...]] = field(default_factory=dict)
-    rows: int = 0
+    def __init__(self, wanted: Wanted) -> None:
+        self.wanted = wanted
+        #: The parts of each column: arrays, or messages.
+        self.columns: defaultdict[str, list[Any]] = defaultdict(list)
+        self.problems: dict[int, Problem] = {}
+        self.piece_proofs: dict[int, tuple[PieceCertificate, ...]] = {}
+        self.motion_proofs: dict[int, tuple[SeparatedInterval, ...]] = {}
+        self.rows = 0
 
     def read(self, data: memoryview) -> None:
         """Adds the rows of an AnswerColumns message. ValueError: it is malformed."""
         first = self.rows
-        arrays: dict[int, tuple[list[Any], Callable[[Any], npt.NDArray[Any]]]] = {
-            1: (self.relations, packed_varints),
-            2: (self.rungs, packed_varints),
-            6: (self.separations, packed_doubles),
-            7: (self.separation_bounds, packed_doubles),
-            8: (self.witness_xyz, packed_doubles),
-            9: (self.witness_errors, packed_doubles),
-            10: (self.within_clearance, packed_varints),
-            12: (self.pieces, packed_varints),
-            14: (self.normal_xyz, packed_doubles),
-            15: (self.normal_angle_bounds, packed_doubles),
-            16: (self.separated_until, packed_doubles),
-            17: (self.contact_times, packed_doubles),
-        }
-        for number, _, value in read_fields(data):
-            if number in arrays:
-                column, decode = arrays[number]
-                column.append(decode(value))
-                if number == 1:
-                    self.rows += len(column[-1])
-            elif isinstance(value, int):
-                continue
-            elif number == 3:
-                axis = collision_pb2.Axis.FromString(bytes(value))
-                self.axes.append(_axis_of(axis) if axis.kind else None)
-            elif number == 4:
-                # Only rows with an answer have sizes.
-                analysis = collision_pb2.Analysis.FromString(bytes(value))
-                self.analyses.append(_analysis_of(analysis) if analysis.ByteSize() else None)
-            elif number == 5:
-                proof = collision_pb2.Certificate.FromString(bytes(value))
-                self.certificates.append(_certificate_of(proof) if proof.ByteSize() else None)
-            elif number == 11:
+        for name, value in named_arrays(collision_pb2.AnswerColumns, data):
+            if name == "relations":
+                self.rows += len(value)
+            if name == "pair_problems":
                 problem = collision_pb2.PairProblem.FromString(bytes(value))
                 self.problems[first + problem.row] = _problem_of(problem)
-            elif number == 13:
+            elif name == "piece_proofs":
                 of_row = collision_pb2.PieceProof.FromString(bytes(value))
                 self.piece_proofs[first + of_row.row] = _piece_certificates_of(of_row.certificates)
-            elif number == 18:
+            elif name == "motion_proofs":
                 motion = collision_pb2.MotionProof.FromString(bytes(value))
                 self.motion_proofs[first + motion.row] = _intervals_of(motion.intervals)
+            elif name in _MESSAGES:
+                kind, decode = _MESSAGES[name]
+                # Rows without the part have an empty message.
+                value = decode(kind.FromString(bytes(value))) if len(value) else None
+                self.columns[name].append(value)
+            else:
+                self.columns[name].append(value)
 
     def finish(self) -> Answers:
         """ValueError: the columns do not match."""
 
-        def doubles(
-            wanted: bool, parts: list[npt.NDArray[np.float64]], shape: tuple[int, ...], name: str
-        ) -> npt.NDArray[np.float64] | None:
+        def doubles(wanted: bool, name: str, *shape: int) -> npt.NDArray[np.float64] | None:
             if not wanted:
                 return None
-            column: npt.NDArray[np.float64] = np.concatenate([np.empty(0), *parts])
-            if column.size != self.rows * int(np.prod(shape)):
-                raise ValueError(
-                    f"the column {name} has {column.size} numbers for {self.rows} answers"
-                )
+            column: npt.NDArray[np.float64] = np.concatenate([np.empty(0), *self.columns[name]])
+            self._check(name, column.size, self.rows * int(np.prod(shape)))
             shaped: npt.NDArray[np.float64] = column.reshape((self.rows, *shape))
             return shaped
 
-        def small(parts: list[Unsigned], name: str) -> npt.NDArray[np.uint8]:
-            column: npt.NDArray[np.uint8] = np.concatenate(
-                [np.empty(0, np.uint8), *(part.astype(np.uint8, copy=False) for part in parts)]
-            )
-            if column.size != self.rows:
-                raise ValueError(
-                    f"the column {name} has {column.size} values for {self.rows} answers"
-                )
+        def small(name: str) -> npt.NDArray[np.uint8]:
+            parts = [part.astype(np.uint8, copy=False) for part in self.columns[name]]
+            column: npt.NDArray[np.uint8] = np.concatenate([np.empty(0, np.uint8), *parts])
+            self._check(name, column.size, self.rows)
             return column
 
-        def messages(wanted: bool, parts: list[T], name: str) -> Sequence[T] | None:
-            if wanted and len(parts) != self.rows:
-                raise ValueError(
-                    f"the column {name} has {len(parts)} entries for {self.rows} answers"
-                )
-            return tuple(parts) if wanted else None
+        def messages(wanted: bool, name: str) -> Sequence[Any] | None:
+            if not wanted:
+                return None
+            self._check(name, len(self.columns[name]), self.rows)
+            return tuple(self.columns[name])
 
         def deciding() -> npt.NDArray[np.int32] | None:
-            empty = np.empty(0, np.uint64)
-            column = np.concatenate([empty, *(part.astype(np.uint64) for part in self.pieces)])
+            parts = [part.astype(np.uint64) for part in self.columns["pieces"]]
+            column = np.concatenate([np.empty(0, np.uint64), *parts])
             if column.size == 0:
                 return None
-            if column.size != 2 * self.rows:
-                raise ValueError(
-                    f"the column pieces has {column.size} numbers for {self.rows} answers"
-                )
+            self._check("pieces", column.size, 2 * self.rows)
             # sint32: 0, -1, 1, -2 ... travel as 0, 1, 2, 3 ...
             half = (column >> np.uint64(1)).astype(np.int64)
             signed = np.where(column & np.uint64(1), ~half, half)
             return signed.astype(np.int32).reshape(-1, 2)
 
         wanted = self.wanted
+        moves = bool(self.columns["separated_until"])
         within = None
         if wanted.clearance is not None:
-            within = small(self.within_clearance, "within_clearance").astype(np.bool_)
+            within = small("within_clearance").astype(np.bool_)
         return Answers(
-            small(self.relations, "relations"),
-            small(self.rungs, "rungs"),
-            doubles(wanted.separation, self.separations, (), "separations"),
-            doubles(wanted.separation, self.separation_bounds, (), "separation_bounds"),
-            doubles(wanted.witness, self.witness_xyz, (2, 3), "witness_xyz"),
-            doubles(wanted.witness, self.witness_errors, (), "witness_errors"),
+            small("relations"),
+            small("rungs"),
+            doubles(wanted.separation, "separations"),
+            doubles(wanted.separation, "separation_bounds"),
+            doubles(wanted.witness, "witness_xyz", 2, 3),
+            doubles(wanted.witness, "witness_errors"),
             within,
-            messages(wanted.axis, self.axes, "axes"),
-            messages(wanted.analysis, self.analyses, "analyses"),
-            messages(wanted.certificate, self.certificates, "certificates"),
+            messages(wanted.axis, "axes"),
+            messages(wanted.analysis, "analyses"),
+            messages(wanted.certificate, "certificates"),
             self.problems,
             deciding(),
             self.piece_proofs,
-            doubles(wanted.normal, self.normal_xyz, (3,), "normal_xyz"),
-            doubles(wanted.normal, self.normal_angle_bounds, (), "normal_angle_bounds"),
-            doubles(bool(self.separated_until), self.separated_until, (), "separated_until"),
-            doubles(bool(self.separated_until), self.contact_times, (), "contact_times"),
+            doubles(wanted.normal, "normal_xyz", 3),
+            doubles(wanted.normal, "normal_angle_bounds"),
+            doubles(moves, "separated_until"),
+            doubles(moves, "contact_times"),
             self.motion_proofs,
         )
+
+    def _check(self, name: str, count: int, expected: int) -> None:
+        if count != expected:
+            raise ValueError(f"the column {name} has {count} values; {expected} were expected")
 
 
 @dataclass
@@ -344,64 +306,35 @@ class Frame:
     pairs: list[Unsigned] = field(default_factory=list)
     totals: SceneTotals | None = None
     piece_hulls: list[HullVersion] = field(default_factory=list)
-    #: Fields that are numbers, by number, of the last message.
-    numbers: dict[int, int] = field(default_factory=dict)
+    #: Fields that are numbers, by name, of the last message.
+    numbers: dict[str, int] = field(default_factory=dict)
 
-    def read(
-        self,
-        data: bytes,
-        *,
-        header: int,
-        hulls: int,
-        problems: int,
-        columns: int,
-        piece_hulls: int,
-        pairs: int | None = None,
-        totals: int | None = None,
-    ) -> None:
-        """Adds a message, by the numbers of its fields."""
+    def read(self, kind: Any, data: bytes) -> None:
+        """Adds a message, of the generated class `kind`."""
         self.numbers = {}
-        for number, _, value in read_fields(data):
-            if number == pairs:
+        for name, value in named_fields(kind, data):
+            if name == "pairs":
                 self.pairs.append(packed_varints(value))
             elif isinstance(value, int):
-                self.numbers[number] = value
-            elif number == columns:
+                self.numbers[name] = value
+            elif name == "columns":
                 self.columns.read(value)
-            elif number == header:
+            elif name == "header":
                 self.header = header_of(geometry_pb2.ResponseHeader.FromString(bytes(value)))
-            elif number == hulls:
+            elif name == "hulls":
                 version = collision_pb2.HullVersion.FromString(bytes(value))
                 self.hulls.append(version_of(version) if version.hull_id else None)
-            elif number == piece_hulls:
+            elif name == "piece_hulls":
                 of_piece = collision_pb2.HullVersion.FromString(bytes(value))
                 self.piece_hulls.append(version_of(of_piece))
-            elif number == problems:
+            elif name == "placement_problems":
                 problem = collision_pb2.PlacementProblem.FromString(bytes(value))
                 self.placement_problems[problem.placement] = _problem_of(problem)
-            elif number == totals:
+            elif name == "totals":
                 sums = collision_pb2.SceneTotals.FromString(bytes(value))
                 self.totals = SceneTotals(
-                    sums.pairs,
-                    sums.candidates,
-                    sums.separated,
-                    sums.touching,
-                    sums.overlapping,
-                    sums.within_tolerance,
-                    sums.failed,
+                    **{name: getattr(sums, name) for name in SceneTotals.__dataclass_fields__}
                 )
-
-    def read_batch(self, data: bytes) -> None:
-        self.read(data, header=1, hulls=2, problems=3, columns=16, piece_hulls=17)
-
-    def read_scene(self, data: bytes) -> None:
-        self.read(data, header=1, hulls=2, problems=3, columns=5, piece_hulls=7, pairs=4, totals=6)
-
-    def read_stream(self, data: bytes) -> tuple[int, bool]:
-        """Returns the number of the client's message that this answers, and true if it is the
-        last."""
-        self.read(data, header=3, hulls=4, problems=5, columns=7, piece_hulls=8, pairs=6)
-        return self.numbers.get(1, 0), bool(self.numbers.get(2, 0))
 
     def indices(self) -> npt.NDArray[np.uint32]:
         empty = np.empty(0, np.uint32)
@@ -412,37 +345,6 @@ class Frame:
 
     def known_piece_hulls(self) -> Mapping[str, HullVersion]:
         return {version.hull_id: version for version in self.piece_hulls}
-
-
-def new_frame(wanted: Wanted) -> Frame:
-    return Frame(ColumnReader(wanted))
-
-
-def decode_batch_part(data: bytes, wanted: Wanted) -> BatchPart:
-    frame = new_frame(wanted)
-    frame.read_batch(data)
-    return BatchPart(
-        frame.numbers.get(4, 0),
-        frame.columns.finish(),
-        frame.header,
-        tuple(frame.hulls),
-        frame.placement_problems,
-        tuple(frame.piece_hulls),
-    )
-
-
-def decode_scene_part(data: bytes, wanted: Wanted) -> ScenePart:
-    frame = new_frame(wanted)
-    frame.read_scene(data)
-    return ScenePart(
-        frame.indices().reshape(-1, 2),
-        frame.columns.finish(),
-        frame.header,
-        tuple(frame.hulls),
-        frame.placement_problems,
-        frame.totals,
-        tuple(frame.piece_hulls),
-    )
 
 
 def decode_collision_changes(data: bytes) -> CollisionChanges:

@@ -555,19 +555,6 @@ class _Rows:
         return error_class(problem.code)(message, code=problem.code, reason=problem.reason)
 
 
-@dataclass(frozen=True)
-class BatchPart:
-    """Answers to the pairs from `first_pair` on. The first parts also contain header, hulls,
-    placement_problems and piece_hulls, as in Batch."""
-
-    first_pair: int
-    answers: Answers
-    header: Header | None
-    hulls: Sequence[HullVersion | None]
-    placement_problems: Mapping[int, Problem]
-    piece_hulls: Sequence[HullVersion] = ()
-
-
 @dataclass(frozen=True, repr=False)
 class Batch(_Rows):
     """The answers to all pairs of a batch.
@@ -598,21 +585,6 @@ class SceneTotals:
     overlapping: int
     within_tolerance: int
     failed: int
-
-
-@dataclass(frozen=True)
-class ScenePart:
-    """Pairs that were found, k x 2, the lower index first, ascending, and their answers. The first
-    parts contain no pairs, but header, hulls, placement_problems and piece_hulls, as in Scene; the
-    last one contains the totals."""
-
-    pairs: npt.NDArray[np.uint32]
-    answers: Answers
-    header: Header | None
-    hulls: Sequence[HullVersion | None]
-    placement_problems: Mapping[int, Problem]
-    totals: SceneTotals | None
-    piece_hulls: Sequence[HullVersion] = ()
 
 
 @dataclass(frozen=True, repr=False)

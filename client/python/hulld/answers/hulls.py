@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
@@ -12,7 +13,7 @@ import numpy.typing as npt
 
 from hulld.notebook import Viewer
 from hulld.v1 import hull_pb2
-from hulld.wire import Unsigned, packed_doubles, packed_varints, read_fields
+from hulld.wire import named_arrays, named_fields
 
 
 @dataclass(frozen=True)
@@ -242,35 +243,6 @@ class HullMesh:
         return viewer.html(rows, [self.info.hull_id])
 
 
-@dataclass(frozen=True)
-class MeshHeader:
-    """The first part of a mesh: the sizes of the following parts. Other fields as in HullMesh."""
-
-    info: HullInfo
-    vertex_count: int
-    facet_count: int
-    error: float | None
-    header: Header
-
-
-@dataclass(frozen=True)
-class MeshVertices:
-    """n x 3, in canonical order, continued from earlier parts."""
-
-    vertices: npt.NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class MeshFacets:
-    """Facets as in HullMesh, continued from earlier parts."""
-
-    sizes: npt.NDArray[np.uint32]
-    indices: npt.NDArray[np.uint32]
-
-
-MeshPart = MeshHeader | MeshVertices | MeshFacets
-
-
 class HullEventKind(IntEnum):
     """The change of a hull since the previous header."""
 
@@ -423,72 +395,43 @@ def decode_changes(data: bytes) -> HullChanges:
     return HullChanges(header_of(message.header), events, message.synced, message.restarted)
 
 
-_MESH_HEADER, _MESH_VERTICES, _MESH_FACETS = 1, 2, 3
-
-
-def decode_mesh_part(data: bytes) -> MeshPart:
-    """Raises ValueError if the message is of an unknown kind."""
-    for number, _, value in read_fields(data):
-        if number == _MESH_HEADER and isinstance(value, memoryview):
-            message = hull_pb2.MeshHeader.FromString(bytes(value))
-            return MeshHeader(
-                info_of(message.hull),
-                message.vertex_count,
-                message.facet_count,
-                message.error if message.HasField("error") else None,
-                header_of(message.header),
-            )
-        if number == _MESH_VERTICES and isinstance(value, memoryview):
-            columns = [
-                packed_doubles(part)
-                for field_number, _, part in read_fields(value)
-                if field_number == 1
-            ]
-            return MeshVertices(np.concatenate(columns or [np.empty(0)]).reshape(-1, 3))
-        if number == _MESH_FACETS and isinstance(value, memoryview):
-            found: dict[int, list[Unsigned]] = {1: [], 2: []}
-            for field_number, _, part in read_fields(value):
-                if field_number in found:
-                    found[field_number].append(packed_varints(part))
-            empty = np.empty(0, np.uint32)
-            sizes, indices = (
-                np.concatenate([empty, *(part.astype(np.uint32) for part in found[n])])
-                for n in (1, 2)
-            )
-            return MeshFacets(sizes, indices)
-    raise ValueError("the mesh stream contains a message of an unknown kind")
-
-
 class MeshAssembly:
     """Assembles the parts of a mesh, and checks that they are consistent."""
 
     def __init__(self, viewer: Viewer | None) -> None:
         self._viewer = viewer
-        self._header: MeshHeader | None = None
-        self._vertices: list[npt.NDArray[np.float64]] = []
-        self._facets: list[MeshFacets] = []
+        self._header: Any = None
+        self._arrays: defaultdict[str, list[npt.NDArray[Any]]] = defaultdict(list)
 
     def add(self, data: bytes) -> None:
-        part = decode_mesh_part(data)
-        if isinstance(part, MeshHeader):
-            self._header = part
-        elif isinstance(part, MeshVertices):
-            self._vertices.append(part.vertices)
-        else:
-            self._facets.append(part)
+        """ValueError: the message is of an unknown kind."""
+        for part, value in named_fields(hull_pb2.GetHullMeshResponse, data):
+            if part == "header":
+                self._header = hull_pb2.MeshHeader.FromString(bytes(value))
+                return
+            kind = hull_pb2.MeshVertices if part == "vertices" else hull_pb2.MeshFacets
+            for name, array in named_arrays(kind, value):
+                self._arrays[name].append(array)
+            return
+        raise ValueError("the mesh stream contains a message of an unknown kind")
 
     def finish(self) -> HullMesh:
         """ValueError: the parts contradict each other."""
         if self._header is None:
             raise ValueError("the mesh stream ended without a header")
         head = self._header
-        vertices = np.concatenate([np.empty((0, 3)), *self._vertices])
-        sizes = np.concatenate([np.empty(0, np.uint32), *(part.sizes for part in self._facets)])
-        indices = np.concatenate([np.empty(0, np.uint32), *(part.indices for part in self._facets)])
+        vertices = np.concatenate([np.empty(0), *self._arrays["xyz"]]).reshape(-1, 3)
+        sizes, indices = (
+            np.concatenate([np.empty(0), *self._arrays[name]]).astype(np.uint32)
+            for name in ("sizes", "indices")
+        )
         if len(vertices) != head.vertex_count or len(sizes) != head.facet_count:
             raise ValueError("the mesh stream ended early, or the counts of its header are wrong")
         if int(sizes.sum(dtype=np.uint64)) != len(indices):
             raise ValueError("the mesh stream's facet sizes and indices disagree")
         if indices.size and int(indices.max()) >= len(vertices):
             raise ValueError("the mesh stream refers to a vertex that it does not contain")
-        return HullMesh(head.info, vertices, sizes, indices, head.error, head.header, self._viewer)
+        error = head.error if head.HasField("error") else None
+        return HullMesh(
+            info_of(head.hull), vertices, sizes, indices, error, header_of(head.header), self._viewer
+        )

@@ -13,15 +13,15 @@ import numpy.typing as npt
 from hulld import arguments
 from hulld.answers import bodies, collision_messages, hulls, status
 from hulld.answers.bodies import Body, BodyInfo, ReplacedBody
-from hulld.answers.collisions import BatchPart, Collision, Method, ScenePart
-from hulld.answers.hulls import CreatedHull, Header, Hull, HullChanges, HullInfo, MeshPart
+from hulld.answers.collisions import Collision, Method
+from hulld.answers.hulls import CreatedHull, Header, Hull, HullChanges, HullInfo
 from hulld.answers.status import ServerStatus
 from hulld.calls.freshness import FIELD, Freshness
 from hulld.calls.wanted import Wanted
 from hulld.geometry.placements import Placements, as_integers
 from hulld.geometry.points import point_block
 from hulld.notebook import Viewer
-from hulld.v1 import body_pb2, collision_pb2, geometry_pb2, hull_pb2, maintenance_pb2, status_pb2
+from hulld.v1 import body_pb2, collision_pb2, geometry_pb2, hull_pb2, status_pb2
 from hulld.wire import MessageWriter
 
 T = TypeVar("T")
@@ -29,7 +29,8 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Call(Generic[T]):
-    """method: gRPC's path. decode: raises ValueError for a malformed answer."""
+    """method: gRPC's path. decode: raises ValueError for a malformed answer; bytes, for an answer
+    in parts, which an assembly decodes."""
 
     method: str
     request: bytes
@@ -40,7 +41,7 @@ class Call(Generic[T]):
 def method_path(service: str, name: str) -> str:
     """gRPC's path of a call, as in "/hulld.v1.HullService/GetHull". KeyError: not in the
     contract."""
-    for module in (hull_pb2, body_pb2, collision_pb2, status_pb2, maintenance_pb2):
+    for module in (hull_pb2, body_pb2, collision_pb2, status_pb2):
         found = module.DESCRIPTOR.services_by_name.get(service)
         if found is not None:
             return f"/{found.full_name}/{found.methods_by_name[name].name}"
@@ -113,7 +114,7 @@ def get_hull_mesh(
     side: Literal["inside", "outside"] | None,
     max_vertices: int | None,
     max_error: float | None,
-) -> Call[MeshPart]:
+) -> Call[bytes]:
     request = hull_pb2.GetHullMeshRequest(hull_id=arguments.hull_id(hull_id))
     if side is None and (max_vertices is not None or max_error is not None):
         raise ValueError(
@@ -133,7 +134,7 @@ def get_hull_mesh(
             arguments.optional_count(max_vertices, "max_vertices", least=1) or 0
         )
         request.simplification.max_error = arguments.optional_length(max_error, "max_error") or 0.0
-    return _call("HullService", "GetHullMesh", request, hulls.decode_mesh_part, True)
+    return _call("HullService", "GetHullMesh", request, bytes, True)
 
 
 @dataclass(frozen=True)
@@ -253,10 +254,6 @@ def get_status() -> Call[ServerStatus]:
     return Call(method_path("StatusService", "GetStatus"), b"", status.decode_status, True)
 
 
-def save_backup() -> Call[bytes]:
-    return Call(method_path("MaintenanceService", "SaveBackup"), b"", bytes, False)
-
-
 def check_collision(
     pair: Placements, wanted: Wanted, tolerance: float, method: Method, viewer: Viewer
 ) -> Call[Collision]:
@@ -282,7 +279,7 @@ def check_collisions(
     wanted: Wanted,
     tolerance: float,
     method: Method,
-) -> Call[BatchPart]:
+) -> Call[bytes]:
     fixed = collision_pb2.BatchCheckCollisionsRequest(
         method=collision_pb2.Method.Name(int(method)),
         wanted=wanted.message(),
@@ -294,13 +291,7 @@ def check_collisions(
         .uint32s(2, pairs)
         .message(6, placements.packed())
     )
-    return _call(
-        "CollisionService",
-        "BatchCheckCollisions",
-        request,
-        lambda data: collision_messages.decode_batch_part(data, wanted),
-        True,
-    )
+    return _call("CollisionService", "BatchCheckCollisions", request, bytes, True)
 
 
 @dataclass(frozen=True)
@@ -352,7 +343,7 @@ def find_collisions(
     tolerance: float,
     first_only: bool = False,
     every_piece: bool = False,
-) -> Call[ScenePart]:
+) -> Call[bytes]:
     fixed = collision_pb2.FindCollisionsRequest(
         wanted=wanted.message(),
         limit=arguments.optional_count(limit, "limit", least=1),
@@ -362,13 +353,7 @@ def find_collisions(
     )
     scene.put(fixed, len(placements))
     request = MessageWriter().raw(fixed.SerializeToString()).message(8, placements.packed())
-    return _call(
-        "CollisionService",
-        "FindCollisions",
-        request,
-        lambda data: collision_messages.decode_scene_part(data, wanted),
-        True,
-    )
+    return _call("CollisionService", "FindCollisions", request, bytes, True)
 
 
 def open_stream(

@@ -60,7 +60,7 @@ class RobotCheck:
     @property
     def first_contact(self) -> int | None:
         """The first colliding configuration; None if there is none. Of a trajectory, the first
-        waypoint: Robot.check_motion also checks the motion between waypoints."""
+        waypoint."""
         return int(np.argmax(self.colliding)) if self.colliding.any() else None
 
     @property
@@ -134,61 +134,6 @@ class RobotCheck:
         if len(self) > 1:
             parts.append(f"{int(self.colliding.sum())} of {len(self)} configurations colliding")
         return f"RobotCheck({', '.join(parts)})"
-
-
-@dataclass(frozen=True)
-class MotionContact:
-    """The end of the search for the first contact of a pair between two waypoints.
-
-    waypoint: the index of the preceding waypoint. pair: names. separated_until: the pair is
-    separated (proven), by more than the clearance, at all times before this one; 0 and 1 are the
-    waypoints. contact_time: its poses at this time touch or overlap, or are within the clearance;
-    None: undecided, because the pair comes within the resolution of contact. relation: at
-    contact_time.
-    """
-
-    waypoint: int
-    pair: tuple[str, str]
-    relation: Relation | None
-    separated_until: float
-    contact_time: float | None
-
-
-@dataclass(frozen=True)
-class MotionCheck:
-    """The answer about a motion through n waypoints.
-
-    contacts: the first contact of each pair that has one, in order of time. undecided: pairs that
-    remained undecided between two waypoints, before any contact. Pairs in neither list are free:
-    separated (proven), by more than the clearance, throughout the exact motion of the joints.
-    """
-
-    waypoints: int
-    contacts: Sequence[MotionContact]
-    undecided: Sequence[MotionContact]
-
-    @property
-    def first_contact(self) -> MotionContact | None:
-        """The earliest contact; None if there is none."""
-        return self.contacts[0] if self.contacts else None
-
-    @property
-    def is_free(self) -> bool:
-        """True if all pairs are free."""
-        return not self.contacts and not self.undecided
-
-    def __bool__(self) -> bool:
-        raise TypeError("an answer is neither true nor false; use .is_free or .first_contact")
-
-    def __repr__(self) -> str:
-        parts = [f"{self.waypoints} waypoints"]
-        if self.is_free:
-            parts.append("free")
-        if self.contacts:
-            parts.append(f"{len(self.contacts)} contacts, first_contact={self.contacts[0]!r}")
-        if self.undecided:
-            parts.append(f"{len(self.undecided)} undecided")
-        return f"MotionCheck({', '.join(parts)})"
 
 
 def collect(

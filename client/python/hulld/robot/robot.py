@@ -11,7 +11,7 @@ import threading
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Self, Union
+from typing import Self, Union
 
 import numpy as np
 import numpy.typing as npt
@@ -24,12 +24,10 @@ from hulld.errors import NotFoundError
 from hulld.geometry.placements import Placements, PlacementsLike, as_radii
 from hulld.geometry.poses import PoseLike, pack_pose
 from hulld.local_server import shared_client
-from hulld.robot.answers import MotionCheck, RobotCheck, collect
+from hulld.robot.answers import RobotCheck, collect
 from hulld.robot.description import Description, PoseNumbers
-from hulld.robot.kinematics import Columns, compose, joint_values, link_poses, stacked
+from hulld.robot.kinematics import compose, joint_values, link_poses, stacked
 from hulld.robot.meshes import MeshLoader, enclosed_volume, read_pieces
-from hulld.robot.motion_bounds import align_turns, bound_motions, stacked_bounds
-from hulld.robot.motion_search import Movers, MotionSearch
 from hulld.robot.package_path import resolve_file
 from hulld.robot.shapes import primitive_points
 from hulld.robot.urdf import read_disabled_pairs, read_urdf
@@ -269,7 +267,7 @@ class Robot:
         which covers a few thousand configurations.
 
         Poses are computed in floating point, and answers are exact for these poses. The motion
-        between configurations is not checked; see check_motion.
+        between configurations is not checked; `hullctl robot check --continuous` checks it.
 
         ValueError: q has another shape, or no pair is left. NotFoundError: a hull of the scene is
         missing.
@@ -296,115 +294,6 @@ class Robot:
             _require_answers(batch, first, names, pairs)
             batches.append(batch.answers)
         return collect(names, pairs, batches)
-
-    def check_motion(
-        self,
-        q: Configurations,
-        *,
-        scene: PlacementsLike | None = None,
-        ignore: Iterable[tuple[str, str]] = (),
-        base: PoseLike = None,
-        clearance: float = 0.0,
-        resolution: float = 1e-6,
-        freshness: Freshness | None = None,
-        timeout: float | None = None,
-    ) -> MotionCheck:
-        """Finds the first contact of each pair while every joint moves linearly from each waypoint
-        to the next; floating joints turn the shorter way. Same check as `hullctl robot check
-        --continuous`.
-
-        q: the waypoints, n x dof, n >= 2, or values by name. clearance: in meters; a separation of
-        at most this counts as contact. resolution: in meters; a pair that comes this close to
-        contact, or to the clearance, may remain undecided. Other arguments are as in `check`.
-        Contacts and free pairs are proven for the exact motion of the joints: bounds cover the
-        paths of the links and all rounding. A pair is not checked after its contact.
-
-        ValueError: q has another shape, no pair is left, a placement of the scene moves, or a part
-        turns or moves too far between two waypoints. NotFoundError: a hull of the scene is missing.
-        """
-        values = self._configurations(q)
-        if len(values) < 2:
-            raise ValueError(f"q has {len(values)} waypoints; a motion needs at least 2")
-        clearance = arguments.number(clearance, "clearance", least=0)
-        resolution = arguments.number(resolution, "resolution", least=0)
-        self._warn_of_limits(values)
-        around = Placements.of([] if scene is None else scene)
-        if around.end_poses is not None:
-            raise ValueError("scene: a placement has an end pose; the scene must be at rest")
-        names = [part.name for part in self.parts] + _names_of(around)
-        pairs = self._pairs_to_check(names, ignore)
-        movers = self._movers(values, names, around, pack_pose(base).tolist())
-        movers.refuse_far_motions()
-
-        def ask(
-            placements: Placements,
-            rows: npt.NDArray[np.uint32],
-            objects: npt.NDArray[np.intp],
-            **options: Any,
-        ) -> Batch:
-            batch = self.client.check_collisions(
-                placements, rows, freshness=freshness, timeout=timeout, **options
-            )
-            unanswered = np.flatnonzero(batch.answers.relations == Relation.UNSPECIFIED)
-            if unanswered.size:
-                row = int(unanswered[0])
-                a, b = objects[row].tolist()
-                raise batch.error(row, f"{names[a]} with {names[b]}: ")
-            return batch
-
-        search = MotionSearch(movers, pairs, ask, clearance, resolution)
-        found = sorted(
-            search.contacts(len(values) - 1),
-            key=lambda one: (one.waypoint, one.contact_time or one.separated_until),
-        )
-        return MotionCheck(
-            len(values),
-            tuple(one for one in found if one.contact_time is not None),
-            tuple(one for one in found if one.contact_time is None),
-        )
-
-    def _movers(
-        self,
-        waypoints: npt.NDArray[np.float64],
-        names: Sequence[str],
-        around: Placements,
-        X_WB: Sequence[float],
-    ) -> Movers:
-        description = self._description
-        values = joint_values(description, waypoints)
-        align_turns(description, values)
-        links = bound_motions(
-            description, X_WB, _rows(values, slice(None, -1)), _rows(values, slice(1, None))
-        )
-        bounds = [links[part.link].fixed(part.X_LS) for part in self.parts]
-
-        def poses_at(
-            segments: npt.NDArray[np.intp], times: npt.NDArray[np.float64]
-        ) -> npt.NDArray[np.float64]:
-            # Many pairs have the same times.
-            keys, inverse = np.unique(
-                np.stack([segments, times], axis=1), axis=0, return_inverse=True
-            )
-            segment, t = keys[:, 0].astype(np.intp), keys[:, 1]
-            start, end = _rows(values, segment), _rows(values, segment + 1)
-            between = [
-                [a if isinstance(a, float) else (1 - t) * a + t * b for a, b in zip(one, other)]
-                for one, other in zip(start, end)
-            ]
-            X_WL = link_poses(description, X_WB, between)
-            poses = [compose(X_WL[part.link], part.X_LS) for part in self.parts]
-            every: npt.NDArray[np.float64] = stacked(poses, len(keys))[inverse.reshape(-1)]
-            return every
-
-        return Movers(
-            names,
-            self._registered(),
-            self._radii,
-            np.array([float(np.linalg.norm(part.points, axis=1).max()) for part in self.parts]),
-            stacked_bounds(bounds, len(waypoints) - 1),
-            around,
-            poses_at,
-        )
 
     def _part_poses(
         self, values: npt.NDArray[np.float64], X_WB: Sequence[float]
@@ -577,13 +466,6 @@ def _require_answers(
     raise batch.error(
         row, f"{names[a]} with {names[b]} in configuration {first + row // len(pairs)}: "
     )
-
-
-def _rows(
-    values: Sequence[Columns], rows: slice | npt.NDArray[np.intp]
-) -> list[list[Any]]:
-    """Some rows of the results of joint_values for many configurations."""
-    return [[one if isinstance(one, float) else one[rows] for one in value] for value in values]
 
 
 def _names_of(scene: Placements) -> list[str]:

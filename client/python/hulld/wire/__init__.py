@@ -4,8 +4,9 @@ from hulld.wire.fields import (
     MessageWriter,
     Unsigned,
     WireError,
+    named_arrays,
+    named_fields,
     packed_doubles,
-    packed_floats,
     packed_varints,
     read_fields,
 )
@@ -14,8 +15,9 @@ __all__ = [
     "MessageWriter",
     "Unsigned",
     "WireError",
+    "named_arrays",
+    "named_fields",
     "packed_doubles",
-    "packed_floats",
     "packed_varints",
     "read_fields",
 ]

@@ -10,11 +10,13 @@ Source: Protocol Buffers, "Encoding". A test compares both directions with proto
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import functools
+from collections.abc import Callable, Iterator
 from typing import Any, Union
 
 import numpy as np
 import numpy.typing as npt
+from google.protobuf.descriptor import FieldDescriptor
 
 VARINT, FIXED64, LENGTH, FIXED32 = 0, 1, 2, 5
 
@@ -159,18 +161,45 @@ def read_fields(data: bytes | memoryview) -> Iterator[tuple[int, int, Value]]:
         at += size
 
 
+@functools.cache
+def _fields_of(kind: Any) -> dict[int, tuple[str, Callable[[Value], npt.NDArray[Any]] | None]]:
+    """The fields of a message by number: the name, and the reader of numbers."""
+    readers = {
+        FieldDescriptor.CPPTYPE_DOUBLE: packed_doubles,
+        FieldDescriptor.CPPTYPE_MESSAGE: None,
+        FieldDescriptor.CPPTYPE_STRING: None,
+    }
+    return {
+        field.number: (field.name, readers.get(field.cpp_type, packed_varints))
+        for field in kind.DESCRIPTOR.fields
+    }
+
+
+def named_fields(kind: Any, data: bytes | memoryview) -> Iterator[tuple[str, Any]]:
+    """As read_fields, with the name of each field in the message `kind` (a generated class).
+    Unknown fields are skipped."""
+    known = _fields_of(kind)
+    for number, _, value in read_fields(data):
+        if number in known:
+            name, read = known[number]
+            if read is None and isinstance(value, int):
+                raise WireError(f"the field {name} is a number, not a message")
+            yield name, value
+
+
+def named_arrays(kind: Any, data: bytes | memoryview) -> Iterator[tuple[str, Any]]:
+    """As named_fields; numbers are arrays."""
+    readers = dict(_fields_of(kind).values())
+    for name, value in named_fields(kind, data):
+        read = readers[name]
+        yield name, value if read is None else read(value)
+
+
 def packed_doubles(value: Value) -> npt.NDArray[np.float64]:
     """The numbers of a `repeated double` field, packed or a single entry: a view, not a copy."""
     if isinstance(value, int) or len(value) % 8:
         raise WireError("a field of doubles has the wrong type or length")
     return np.frombuffer(value, "<f8")
-
-
-def packed_floats(value: Value) -> npt.NDArray[np.float32]:
-    """The numbers of a `repeated float` field, as packed_doubles."""
-    if isinstance(value, int) or len(value) % 4:
-        raise WireError("a field of floats has the wrong type or length")
-    return np.frombuffer(value, "<f4")
 
 
 def packed_varints(value: Value) -> Unsigned:

@@ -84,31 +84,6 @@ TEST(Protocol, GeometryRequestsAreRead) {
   EXPECT_EQ(request->simplification().max_vertices(), 8);
 }
 
-TEST(Protocol, EditsAreRead) {
-  const auto append = ParsePageMessage(
-      R"({"type":"edit","action":"append","hullId":"a/b","points":[0.1,-2,3e300]})");
-  ASSERT_TRUE(append.ok()) << append.status();
-  ASSERT_TRUE(append->edit.has_value());
-  EXPECT_EQ(append->edit->action, ViewEdit::Action::kAppend);
-  EXPECT_EQ(append->edit->hull_id, "a/b");
-  EXPECT_THAT(append->edit->points, ElementsAre(0.1, -2, 3e300));
-  const auto remove =
-      ParsePageMessage(R"({"type":"edit","action":"delete","hullId":"a/b","points":[]})");
-  ASSERT_TRUE(remove.ok()) << remove.status();
-  EXPECT_EQ(remove->edit->action, ViewEdit::Action::kDelete);
-
-  EXPECT_THAT(ErrorOf(R"({"type":"edit","action":"replace","hullId":"a"})"),
-              HasSubstr("neither append nor delete"));
-  EXPECT_THAT(ErrorOf(R"({"type":"edit","action":"append","hullId":"a","points":[]})"),
-              HasSubstr("three numbers"));
-  EXPECT_THAT(ErrorOf(R"({"type":"edit","action":"append","hullId":"a","points":[1,2,3,4]})"),
-              HasSubstr("three numbers"));
-  EXPECT_THAT(ErrorOf(R"({"type":"edit","action":"append","hullId":"a","points":[1,2,"3"]})"),
-              HasSubstr("not a number"));
-  EXPECT_THAT(ErrorOf(R"({"type":"edit","action":"delete","hullId":"a","points":[1,2,3]})"),
-              HasSubstr("three numbers"));
-}
-
 TEST(Protocol, MalformedMessagesAreRefused) {
   EXPECT_NE(ErrorOf("no json"), "");
   EXPECT_NE(ErrorOf("[]"), "");

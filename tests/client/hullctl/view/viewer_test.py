@@ -459,36 +459,6 @@ class ViewerTest(viewer_case.ViewerCase):
         self.browser.wait("hulldViewer.model.selected !== null")
         self.assert_answers_as_api()
 
-    def test_changes_hulls_only_with_edit(self):
-        self.hulld.add_box("edited")
-        self.view("edited")
-        self.assertFalse(self.browser.js("Boolean(document.querySelector('#edit-points'))"))
-        # A page that tries is refused as well.
-        self.browser.js("hulldViewer.connection.send("
-                        "{type: 'edit', action: 'delete', hullId: 'edited', points: []})")
-        self.browser.wait("document.querySelector('#message').textContent.includes('--edit')")
-        self.view("edited", "--edit")
-        points = self.browser.wait("document.querySelector('#edit-points')")
-        append = self.browser.driver.find_element(By.ID, "edit-append")
-        points.send_keys("0 0 five")
-        append.click()
-        self.assertIn("is not three numbers", self.browser.text("#edit-result"))
-        points.clear()
-        points.send_keys("0 0 5.1\n0, 0, 0")
-        append.click()
-        self.browser.wait("hulldViewer.model.hulls.get('edited').high[2] === 5.1")
-        self.browser.wait(
-            "document.querySelector('#edit-result').textContent.includes('2 appended, 1 outside')")
-        self.assertEqual(self.hulld.json("get", "edited")["hull"]["vertexCount"], "9")
-        # The first press asks for confirmation.
-        delete = self.browser.driver.find_element(By.ID, "edit-delete")
-        delete.click()
-        self.assertIn("Really delete edited", delete.text)
-        self.assertIn("edited", self.hulld.hullctl("list"))
-        delete.click()
-        self.browser.wait("document.querySelector('#tree').textContent.includes('deleted')")
-        self.assertNotIn("edited", self.hulld.hullctl("list"))
-
     def test_tolerance_of_the_pair_is_answered_beside_the_exact_answer(self):
         self.view("room/left", "room/right")
         self.assert_answers_as_api()

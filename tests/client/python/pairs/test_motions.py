@@ -188,15 +188,12 @@ def test_options_bound_the_brackets_of_scenes(either: Any) -> None:
         options = {} if error is None else {"max_time_error": error}
         contact = either.find_collisions(moving, **options)[0].first_contact
         widths[error] = contact.contact_time - contact.separated_until
-        (parts,) = [p for p in either.iter_find_collisions(moving, **options) if len(p.pairs)]
-        assert parts.answers.contact_times[0] == contact.contact_time
         assert 0 <= widths[error] <= (error or 2**-30)
     assert widths[None] < widths[1e-3] < widths[0.25]
     with pytest.raises(hulld.InvalidArgumentError, match="wanted.max_time_error"):
         either.find_collisions(moving, max_time_error=2)
-    for call in (either.find_collisions, lambda *a, **o: list(either.iter_find_collisions(*a, **o))):
-        with pytest.raises(ValueError, match="resolution"):
-            call(moving, resolution=-1)
+    with pytest.raises(ValueError, match="resolution"):
+        either.find_collisions(moving, resolution=-1)
     # The corner of a box that turns by 90 degrees passes a wall, 1e-14 away.
     wall = CUBE * (1, 10, 10) + (2**0.5 + 1e-14, -5, -5)
     box = hulld.Placement(points=2 * CUBE - 1, end_pose=(1, 0, 0, 1, 0, 0, 0))
@@ -325,8 +322,6 @@ def test_the_first_contacts_of_a_scene_are_found(client: hulld.Client, cube: str
     scene = client.find_collisions(placements, first_only=True, certificate=True)
     assert scene.pairs.tolist() == [[0, 1]]
     hulld.Verifier(client).check_row(placements, scene, 0)
-    parts = list(client.iter_find_collisions(placements, first_only=True))
-    assert sum(len(part.pairs) for part in parts) == 1
     with pytest.raises(hulld.InvalidArgumentError, match="no placement has an end_pose"):
         client.find_collisions([cube, cube], first_only=True)
 

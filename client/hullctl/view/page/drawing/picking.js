@@ -5,26 +5,14 @@ import {rotateBack, toWorld, unitQuaternion} from 'hulld/pose.js';
 // Distance in CSS pixels within which a picked point snaps to a vertex.
 const SNAP = 10;
 
-// Returns the distance along the ray to the nearest triangle; Infinity if it meets none. Source:
-// Moeller and Trumbore 1997.
-function hitTriangles(shape, o, d) {
-  const {xyz, triangles} = shape;
+// Returns the distance along the ray to the nearest triangle; Infinity if it meets none.
+function hitTriangles({xyz, triangles}, ray) {
+  const [a, b, c, point] = Array.from({length: 4}, () => new THREE.Vector3());
   let nearest = Infinity;
   for (let t = 0; t < triangles.length; t += 3) {
-    const [a, b, c] = [3 * triangles[t], 3 * triangles[t + 1], 3 * triangles[t + 2]];
-    const ux = xyz[b] - xyz[a], uy = xyz[b + 1] - xyz[a + 1], uz = xyz[b + 2] - xyz[a + 2];
-    const vx = xyz[c] - xyz[a], vy = xyz[c + 1] - xyz[a + 1], vz = xyz[c + 2] - xyz[a + 2];
-    const px = d[1] * vz - d[2] * vy, py = d[2] * vx - d[0] * vz, pz = d[0] * vy - d[1] * vx;
-    const det = ux * px + uy * py + uz * pz;
-    if (det === 0) continue;
-    const sx = o[0] - xyz[a], sy = o[1] - xyz[a + 1], sz = o[2] - xyz[a + 2];
-    const u = (sx * px + sy * py + sz * pz) / det;
-    if (u < 0 || u > 1) continue;
-    const qx = sy * uz - sz * uy, qy = sz * ux - sx * uz, qz = sx * uy - sy * ux;
-    const v = (d[0] * qx + d[1] * qy + d[2] * qz) / det;
-    if (v < 0 || u + v > 1) continue;
-    const distance = (vx * qx + vy * qy + vz * qz) / det;
-    if (distance > 0 && distance < nearest) nearest = distance;
+    [a, b, c].forEach((corner, k) => corner.fromArray(xyz, 3 * triangles[t + k]));
+    if (!ray.intersectTriangle(a, b, c, false, point)) continue;
+    nearest = Math.min(nearest, point.distanceTo(ray.origin));
   }
   return nearest;
 }
@@ -75,7 +63,8 @@ export function pick(model, stage, x, y, {toVertex = false} = {}) {
     const q = unitQuaternion(object.pose);
     const local = rotateBack(q, toward).map((value, k) => value + shape.center[k]);
     const turned = rotateBack(q, direction);
-    const distance = shape.triangles.length ? hitTriangles(shape, local, turned) : along;
+    const turnedRay = new THREE.Ray(new THREE.Vector3(...local), new THREE.Vector3(...turned));
+    const distance = shape.triangles.length ? hitTriangles(shape, turnedRay) : along;
     if (distance >= nearest) continue;
     nearest = distance;
     picked = {index: object.index, point: local.map((value, k) => value + distance * turned[k])};

@@ -51,8 +51,8 @@ export function bindKeys(actions) {
   addEventListener('keydown', (event) => {
     const isUndo = (event.ctrlKey || event.metaKey) && event.key === 'z';
     if ((event.ctrlKey || event.metaKey || event.altKey) && !isUndo) return;
-    const typing = event.target.matches?.(
-        'input:not([type="checkbox"]):not([type="color"]), select, textarea');
+    const typing =
+        event.target.matches?.('input:not([type="checkbox"]):not([type="color"]), select');
     if (typing) {
       if (event.key === 'Escape') event.target.blur();
       return;

@@ -5,13 +5,10 @@ import {poseText} from 'hulld/pose.js';
 const POSE_NAMES = ['w', 'x', 'y', 'z', 'x', 'y', 'z'];
 
 export class ObjectPanel {
-  constructor(model, live, simplify, edit) {
+  constructor(model, live, simplify) {
     this.model = model;
     this.live = live;
     this.simplify = simplify;
-    this.edit = edit;
-    // Set by the bridge.
-    this.mayEdit = false;
     this.root = document.getElementById('object');
     this.side = 'inside';
     this.steps = 0;
@@ -33,7 +30,7 @@ export class ObjectPanel {
     }
     // A change of the object must not disturb typing.
     if (this.root.contains(document.activeElement) && this.shownIndex === object.index &&
-        document.activeElement.matches('input, textarea, button')) {
+        document.activeElement.matches('input, button')) {
       this.factsBlock.replaceChildren(...this.factRows(object));
       return;
     }
@@ -45,7 +42,6 @@ export class ObjectPanel {
     if (isHull && this.live && this.model.hullOf(object)?.dimension === 3) {
       blocks.push(this.simplifyBlock(object));
     }
-    if (this.mayEdit && isHull && !object.gone) blocks.push(this.editBlock(object));
     blocks.push(this.factsBlock);
     this.root.replaceChildren(...blocks);
   }
@@ -253,64 +249,6 @@ export class ObjectPanel {
                     'option', {value: 'outside', selected: this.side === 'outside'},
                     'outside: encloses the hull'))),
         this.result);
-  }
-
-  // Controls that append points and delete the hull.
-  editBlock(object) {
-    // Keeps the input and its result while the object is selected.
-    if (this.editing?.object === object) return this.editing.block;
-    const points = element('textarea', {
-      id: 'edit-points',
-      rows: 3,
-      spellcheck: false,
-      placeholder: 'x y z, one point per line',
-      'aria-label': `Points to append to ${object.hullId}`,
-    });
-    const append = element(
-        'button', {type: 'button', id: 'edit-append', onclick: () => this.append(object, points)},
-        'Append points');
-    const remove = element('button', {type: 'button', id: 'edit-delete'}, 'Delete this hull');
-    // Requires a second press, with another label, to prevent accidental deletion.
-    remove.addEventListener('click', () => {
-      if (remove.dataset.sure) {
-        this.edit({action: 'delete', hullId: object.hullId, points: []});
-      } else {
-        remove.dataset.sure = 'yes';
-        remove.textContent = `Really delete ${object.hullId} for everyone`;
-      }
-    });
-    remove.addEventListener('blur', () => {
-      delete remove.dataset.sure;
-      remove.textContent = 'Delete this hull';
-    });
-    this.editResult = element('p', {className: 'quiet', id: 'edit-result', 'aria-live': 'polite'});
-    const block = element(
-        'div', {className: 'block'}, element('h2', {}, 'Edit this hull'), points,
-        element('div', {className: 'buttons'}, append, remove), this.editResult);
-    this.editing = {object, block};
-    return block;
-  }
-
-  append({hullId}, area) {
-    const lines = area.value.split('\n').map((line) => line.trim()).filter(Boolean);
-    const points = lines.map((line) => line.split(/[\s,;]+/).map(Number));
-    const wrong = points.findIndex((point) => point.length !== 3 || !point.every(Number.isFinite));
-    area.setAttribute('aria-invalid', String(wrong >= 0 || !lines.length));
-    if (wrong >= 0 || !lines.length) {
-      this.editResult.textContent =
-          lines.length ? `"${lines[wrong]}" is not three numbers.` : 'There are no points yet.';
-      return;
-    }
-    this.sent = area;
-    this.edit({action: 'append', hullId, points: points.flat()});
-  }
-
-  // Returns true if the result was shown here.
-  edited({hullId, done, message}) {
-    if (this.object?.hullId !== hullId || !this.editResult?.isConnected) return false;
-    this.editResult.textContent = message;
-    if (done && this.sent?.isConnected) this.sent.value = '';
-    return true;
   }
 
   simplified(hull) {
