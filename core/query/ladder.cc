@@ -88,6 +88,7 @@ void Accept(const FloatSearchResult& found, Rung rung, Purpose purpose, Decision
   decision.rung = rung;
   if (purpose == Purpose::kRelation) return;
   if (found.verdict == FloatVerdict::kSeparated) decision.axis = found.axis;
+  decision.reach = found.reach;
   decision.pair_count = found.pair_count;
   decision.pairs = found.pairs;
 }

@@ -4,6 +4,7 @@
 #include <absl/status/status.h>
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <functional>
 
@@ -25,6 +26,9 @@ struct Decision {
   Rung rung = Rung::kBounds;
   // Separated: n.(a - b) < 0 throughout; touching: <= 0. Exact as given.
   ExactDirection axis;
+  // FloatSearchResult::reach along that axis if a search in floating point found it; otherwise
+  // infinite.
+  double reach = INFINITY;
   // Separated: up to three pairs, whose differences are near the nearest point of A - B; a hint.
   // Overlapping: none, or four pairs; the hull of their differences contains 0 strictly inside.
   // Touching: none, or three pairs, repetitions included; the hull of their differences contains 0.

@@ -200,6 +200,7 @@ class SeparationSearch {
     toward_ = -pair_.CenterDifference();
     if (cold || decision.rung == Rung::kBounds) {
       if (const Vector* n = std::get_if<Vector>(&decision.axis)) toward_ = *n;
+      reach_ = decision.reach;
       SetStart(decision.pairs, decision.pair_count);
       return;
     }
@@ -207,6 +208,7 @@ class SeparationSearch {
         SearchInFloatingPoint(pair_, 0, -pair_.CenterDifference(), max_error);
     if (found.verdict == FloatVerdict::kUndecided) return;
     if (found.verdict == FloatVerdict::kSeparated) toward_ = found.axis;
+    reach_ = found.reach;
     SetStart(found.pairs, found.pair_count);
   }
 
@@ -221,7 +223,7 @@ class SeparationSearch {
   void Bound(const SeparationGoal& goal, bool want_point) {
     if (!pair_.usable()) return;
     if (core_ == Relation::kSeparated) {
-      bounds_ = BoundDistance(pair_, toward_, start(), goal);
+      bounds_ = BoundDistance(pair_, toward_, start(), goal, reach_);
     } else {
       seed_.clear();
       bounds_ = BoundDepth(pair_, start(), goal, want_point, poll_, seed_);
@@ -506,6 +508,8 @@ class SeparationSearch {
   StopPoll poll_;
   const double size_;
   Vector toward_ = Vector::Zero();
+  // FloatSearchResult::reach along it, if known.
+  double reach_ = INFINITY;
   uint32_t start_count_ = 0;
   std::array<VertexPair, 4> start_pairs_;
   // Overlapping: the pairs of all vertices that the floating-point search visited.

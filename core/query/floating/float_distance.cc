@@ -22,8 +22,8 @@ using Corner = MinkowskiVertex<PlainVector>;
 
 // Lower bound on the distance from the support along a unit vector.
 template <typename Pair>
-double LowOf(const Pair& pair, const FloatPair::Support& farthest) {
-  return -farthest.value - kReachErrorFactor * pair.size();
+double LowOf(const Pair& pair, double value) {
+  return -value - kReachErrorFactor * pair.size();
 }
 
 // The corners of the part of A - B that is nearest to the origin so far. Pair: a FloatPair or a
@@ -37,19 +37,13 @@ class Walk {
   SeparationBounds Run(const PlainVector& first, std::span<const VertexPair> start) {
     const double largest = LargestComponent(first);
     PlainVector n = {first.x / largest, first.y / largest, first.z / largest};
-    if (!start.empty()) {
-      for (const VertexPair& known : start) Add(known);
-      if (const NearestPart part = Nearest(); Accept(part)) n = part.toward;
-    }
+    if (!start.empty()) n = StartAt(start).toward;
     for (int step = 0; step < kMaxSteps; ++step) {
       const double length = Norm(n);
       if (!(length > 0)) break;
       n = (1 / length) * n;
       const FloatPair::Support farthest = pair_.Farthest(n);
-      if (const double low = LowOf(pair_, farthest); low > bounds_.low) {
-        bounds_.low = low;
-        bounds_.direction = n;
-      }
+      TakeReach(n, farthest.value);
       if (goal_.Met(bounds_.low, bounds_.high) || Contains(farthest.pair)) break;
       Add(farthest.pair);
       const NearestPart part = Nearest();
@@ -62,7 +56,34 @@ class Walk {
     return bounds_;
   }
 
+  // Bounds the distance by the reach of A - B along n and by the point of `start`, without a walk.
+  // Returns true if the goal is met. Requires: `start` is not empty.
+  bool Meets(const PlainVector& n, double reach, std::span<const VertexPair> start) {
+    StartAt(start);
+    const double length = Norm(n);
+    TakeReach({n.x / length, n.y / length, n.z / length}, reach / length);
+    bounds_.low = std::min(bounds_.low, bounds_.high);
+    return goal_.Met(bounds_.low, bounds_.high);
+  }
+
+  const SeparationBounds& bounds() const { return bounds_; }
+
  private:
+  NearestPart StartAt(std::span<const VertexPair> start) {
+    for (const VertexPair& known : start) Add(known);
+    const NearestPart part = Nearest();
+    Accept(part);
+    return part;
+  }
+
+  // Improves the lower bound by the support along a unit vector.
+  void TakeReach(const PlainVector& n, double value) {
+    const double low = LowOf(pair_, value);
+    if (!(low > bounds_.low)) return;
+    bounds_.low = low;
+    bounds_.direction = n;
+  }
+
   void Add(VertexPair pair) { corners_[count_++] = {per_unit_ * pair_.Difference(pair), pair}; }
 
   bool Contains(VertexPair pair) const {
@@ -159,9 +180,14 @@ SeparationBounds WalkSmall(const FloatPair& pair, const PlainVector& n,
 }  // namespace
 
 SeparationBounds BoundDistance(const FloatPair& pair, const Vector& n,
-                               std::span<const VertexPair> start, const SeparationGoal& goal) {
+                               std::span<const VertexPair> start, const SeparationGoal& goal,
+                               double reach) {
   HULLD_CHECK(pair.usable());
   HULLD_CHECK(start.size() <= 3);
+  if (reach < INFINITY && !start.empty()) {
+    Walk walk(pair, goal);
+    if (walk.Meets(n, reach, start)) return walk.bounds();
+  }
   if (SmallPair<8>::Fits(pair)) return WalkSmall<8>(pair, n, start, goal);
   if (SmallPair<16>::Fits(pair)) return WalkSmall<16>(pair, n, start, goal);
   return Walk(pair, goal).Run(n, start);
@@ -169,7 +195,7 @@ SeparationBounds BoundDistance(const FloatPair& pair, const Vector& n,
 
 double DistanceAlong(const FloatPair& pair, const Vector& n) {
   const Vector scaled = n / n.cwiseAbs().maxCoeff();
-  return LowOf(pair, pair.Farthest(Vector(scaled / scaled.norm())));
+  return LowOf(pair, pair.Farthest(Vector(scaled / scaled.norm())).value);
 }
 
 double DistanceOfTriangle(const FloatPair& pair, const VertexPair* pairs) {

@@ -1,6 +1,7 @@
 #ifndef HULLD_CORE_QUERY_FLOATING_FLOAT_DISTANCE_H_
 #define HULLD_CORE_QUERY_FLOATING_FLOAT_DISTANCE_H_
 
+#include <cmath>
 #include <span>
 
 #include "core/query/floating/float_pair.h"
@@ -14,9 +15,11 @@ namespace hulld {
 // independently of the walk: the distance is at most that of any point of A - B, and at least minus
 // the reach of A - B along any unit vector. `n`: the initial direction; zero gives no bounds.
 // `start`: pairs where the walk begins, for example those where a search of the relation ended; at
-// most three, may be empty. The bounds may miss the goal. Requires: pair.usable().
+// most three, may be empty. `reach`: FloatSearchResult::reach along n if known; there is no walk if
+// it and `start` meet the goal. The bounds may miss the goal. Requires: pair.usable().
 SeparationBounds BoundDistance(const FloatPair& pair, const Vector& n,
-                               std::span<const VertexPair> start, const SeparationGoal& goal);
+                               std::span<const VertexPair> start, const SeparationGoal& goal,
+                               double reach = INFINITY);
 
 // Returns the vector from the point of A - B in `bounds` to the origin; zero if it is unknown.
 Vector TowardOrigin(const FloatPair& pair, const SeparationBounds& bounds);

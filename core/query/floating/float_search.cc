@@ -85,6 +85,7 @@ class FloatSearch {
     if (farthest.value < -error) {
       result_.verdict = FloatVerdict::kSeparated;
       result_.axis = along_;
+      result_.reach = farthest.value;
       if (max_error_ == kEndsAtSign) return false;
     }
     const bool is_first = simplex_.count() == 0;
@@ -223,6 +224,7 @@ FloatSearchResult TryCached(const FloatPair& pair, const PairCache& cache) {
     if (value < -error) {
       result.verdict = FloatVerdict::kSeparated;
       result.axis = n;
+      result.reach = value;
     } else if (cache.pair_count > 0 && value <= error) {
       result.axis = n;
       result.pair_count = cache.pair_count;

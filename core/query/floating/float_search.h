@@ -2,6 +2,7 @@
 #define HULLD_CORE_QUERY_FLOATING_FLOAT_SEARCH_H_
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 
 #include "core/query/floating/float_pair.h"
@@ -18,6 +19,8 @@ struct FloatSearchResult {
   // Separated: n.(a - b) < 0 throughout, exactly as given. Otherwise the last direction tried, a
   // hint.
   Vector axis = Vector::Zero();
+  // Separated: the greatest n.(a - b), within FloatPair::SupportError.
+  double reach = INFINITY;
   // Overlapping: four pairs; the hull of their differences contains the origin strictly inside.
   // Otherwise the end of the search, a hint; separated: at most three.
   uint32_t pair_count = 0;
