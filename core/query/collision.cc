@@ -65,12 +65,23 @@ std::weak_ordering Compare(const PoseProduct* a, const PoseProduct* b) {
   return std::weak_ordering::equivalent;
 }
 
-// Returns true if (A, B) is in the order of Compare. The first coordinate usually decides.
-bool IsInOrder(const PlacedHull& a, const PlacedHull& b) {
-  const double x_a = a.X_WH().t.x();
-  const double x_b = b.X_WH().t.x();
-  return x_a == x_b ? Compare(a, b) <= 0 : x_a < x_b;
-}
+// Two hulls in the order of Compare. The first coordinate usually decides. The order is
+// unpredictable, so it selects the hulls without a branch.
+class OrderedPair {
+ public:
+  OrderedPair(const PlacedHull& a, const PlacedHull& b) : hulls_{&a, &b} {
+    const double x_a = a.X_WH().t.x();
+    const double x_b = b.X_WH().t.x();
+    swapped_ = x_a == x_b ? Compare(a, b) > 0 : x_a > x_b;
+  }
+  const PlacedHull& first() const { return *hulls_[swapped_]; }
+  const PlacedHull& second() const { return *hulls_[1 - swapped_]; }
+  bool swapped() const { return swapped_ != 0; }
+
+ private:
+  const PlacedHull* hulls_[2];
+  size_t swapped_;
+};
 
 bool IsRounded(const PlacedHull& a, const PlacedHull& b) {
   return a.is_rounded() || b.is_rounded();
@@ -90,7 +101,7 @@ AxisKind Mirrored(AxisKind kind) {
 }
 
 // Converts the answer for (A, B) to the answer for (B, A).
-Answer Mirrored(Answer answer) {
+void Mirror(Answer& answer) {
   if (answer.analysis && answer.analysis->stage) {
     answer.analysis->stage = Mirrored(*answer.analysis->stage);
   }
@@ -103,7 +114,6 @@ Answer Mirrored(Answer answer) {
   // 0 stays +0.
   if (answer.normal) answer.normal->direction = Vector::Zero() - answer.normal->direction;
   if (answer.certificate) answer.certificate = Mirrored(*std::move(answer.certificate));
-  return answer;
 }
 
 bool WantsSeparation(const QueryOptions& options) {
@@ -256,13 +266,13 @@ void Mirror(PairCache& cache) {
 absl::StatusOr<Answer> RelationOnly(const PlacedHull& a, const PlacedHull& b,
                                     const QueryOptions& options, PairCache* cache) {
   // The relation is symmetric; only the cache depends on the order.
-  const bool swapped = !IsInOrder(a, b);
-  if (swapped && cache != nullptr) Mirror(*cache);
+  const OrderedPair ordered(a, b);
+  if (cache != nullptr && ordered.swapped()) Mirror(*cache);
   Decision decision;
   const absl::Status decided =
-      Decide(FloatPair(swapped ? b : a, swapped ? a : b), options.tolerance, cache,
+      Decide(FloatPair(ordered.first(), ordered.second()), options.tolerance, cache,
              Purpose::kRelation, kEndsAtSign, options.should_stop, decision);
-  if (swapped && cache != nullptr) Mirror(*cache);
+  if (cache != nullptr && ordered.swapped()) Mirror(*cache);
   // Every return statement names this variable, so that the compiler constructs it in the caller's
   // storage.
   absl::StatusOr<Answer> answer(absl::in_place);
@@ -278,12 +288,12 @@ absl::StatusOr<Answer> RelationOnly(const PlacedHull& a, const PlacedHull& b,
 absl::StatusOr<Answer> CertifiedSearchOfEither(const PlacedHull& a, const PlacedHull& b,
                                                const QueryOptions& options, PairCache* cache) {
   const auto search = IsRounded(a, b) ? SearchRounded : CertifiedSearch;
-  if (IsInOrder(a, b)) return search(a, b, options, cache);
-  if (cache != nullptr) Mirror(*cache);
-  absl::StatusOr<Answer> answer = search(b, a, options, cache);
-  if (cache != nullptr) Mirror(*cache);
-  if (!answer.ok()) return answer;
-  return Mirrored(*std::move(answer));
+  const OrderedPair ordered(a, b);
+  if (cache != nullptr && ordered.swapped()) Mirror(*cache);
+  absl::StatusOr<Answer> answer = search(ordered.first(), ordered.second(), options, cache);
+  if (cache != nullptr && ordered.swapped()) Mirror(*cache);
+  if (ordered.swapped() && answer.ok()) Mirror(*answer);
+  return answer;
 }
 
 // Completes the textbook's answer with the details that only the search finds.

@@ -26,15 +26,14 @@ struct Decision {
   Rung rung = Rung::kBounds;
   // Separated: n.(a - b) < 0 throughout; touching: <= 0. Exact as given.
   ExactDirection axis;
-  // FloatSearchResult::reach along that axis if a search in floating point found it; otherwise
-  // infinite.
-  double reach = INFINITY;
   // Separated: up to three pairs, whose differences are near the nearest point of A - B; a hint.
   // Overlapping: none, or four pairs; the hull of their differences contains 0 strictly inside.
   // Touching: none, or three pairs, repetitions included; the hull of their differences contains 0.
   uint32_t pair_count = 0;
   std::array<VertexPair, 4> pairs = {};
   uint64_t directions_tried = 0;
+  // FloatSearchResult::reach if the search in floating point found the axis; otherwise infinite.
+  double reach = INFINITY;
 };
 
 // The use of a decision.

@@ -322,18 +322,17 @@ class SeparationSearch {
     const double width =
         std::max(bounds_.point_length - bounds_.low, bounds_.high - bounds_.point_length);
     if (width > 4 * (bound + rounding)) return false;
-    Vector p_A = Vector::Zero();
-    Vector p_B = Vector::Zero();
+    PlainVector p_A;
+    PlainVector p_B;
     for (uint32_t i = 0; i < point.count; ++i) {
-      p_A += Vector(point.weights[i] * pair_.PositionA(point.pairs[i].a));
-      p_B += Vector(point.weights[i] * pair_.PositionB(point.pairs[i].b));
+      p_A = p_A + point.weights[i] * pair_.PositionA(point.pairs[i].a);
+      p_B = p_B + point.weights[i] * pair_.PositionB(point.pairs[i].b);
     }
-    const Vector& t = pair_.a().X_WH().t;
-    Witness witness{p_A + t, p_B + t, 0};
-    const double largest =
-        std::max(witness.p_WA.cwiseAbs().maxCoeff(), witness.p_WB.cwiseAbs().maxCoeff());
-    witness.error = width + 2 * rounding + 4 * kUnitRoundoff * largest;
-    answer.witness = witness;
+    const PlainVector t = pair_.a().X_WH().t;
+    const PlainVector p_WA = p_A + t;
+    const PlainVector p_WB = p_B + t;
+    const double largest = std::max(LargestComponent(p_WA), LargestComponent(p_WB));
+    answer.witness = {p_WA, p_WB, width + 2 * rounding + 4 * kUnitRoundoff * largest};
     return true;
   }
 

@@ -37,13 +37,19 @@ class Walk {
   SeparationBounds Run(const PlainVector& first, std::span<const VertexPair> start) {
     const double largest = LargestComponent(first);
     PlainVector n = {first.x / largest, first.y / largest, first.z / largest};
-    if (!start.empty()) n = StartAt(start).toward;
+    if (!start.empty()) {
+      for (const VertexPair& known : start) Add(known);
+      if (const NearestPart part = Nearest(); Accept(part)) n = part.toward;
+    }
     for (int step = 0; step < kMaxSteps; ++step) {
       const double length = Norm(n);
       if (!(length > 0)) break;
       n = (1 / length) * n;
       const FloatPair::Support farthest = pair_.Farthest(n);
-      TakeReach(n, farthest.value);
+      if (const double low = LowOf(pair_, farthest.value); low > bounds_.low) {
+        bounds_.low = low;
+        bounds_.direction = n;
+      }
       if (goal_.Met(bounds_.low, bounds_.high) || Contains(farthest.pair)) break;
       Add(farthest.pair);
       const NearestPart part = Nearest();
@@ -56,34 +62,7 @@ class Walk {
     return bounds_;
   }
 
-  // Bounds the distance by the reach of A - B along n and by the point of `start`, without a walk.
-  // Returns true if the goal is met. Requires: `start` is not empty.
-  bool Meets(const PlainVector& n, double reach, std::span<const VertexPair> start) {
-    StartAt(start);
-    const double length = Norm(n);
-    TakeReach({n.x / length, n.y / length, n.z / length}, reach / length);
-    bounds_.low = std::min(bounds_.low, bounds_.high);
-    return goal_.Met(bounds_.low, bounds_.high);
-  }
-
-  const SeparationBounds& bounds() const { return bounds_; }
-
  private:
-  NearestPart StartAt(std::span<const VertexPair> start) {
-    for (const VertexPair& known : start) Add(known);
-    const NearestPart part = Nearest();
-    Accept(part);
-    return part;
-  }
-
-  // Improves the lower bound by the support along a unit vector.
-  void TakeReach(const PlainVector& n, double value) {
-    const double low = LowOf(pair_, value);
-    if (!(low > bounds_.low)) return;
-    bounds_.low = low;
-    bounds_.direction = n;
-  }
-
   void Add(VertexPair pair) { corners_[count_++] = {per_unit_ * pair_.Difference(pair), pair}; }
 
   bool Contains(VertexPair pair) const {
@@ -177,6 +156,49 @@ SeparationBounds WalkSmall(const FloatPair& pair, const PlainVector& n,
              : WalkSmallPortably<kMaxVertices>(pair, n, start, goal);
 }
 
+// Returns the weights of the corners of a simplex in its point nearest to the origin, if that is
+// inside it: not negative, with a sum within 8 u of 1. Otherwise the point may be a farther one.
+// NaN if rounding leaves no positive weight.
+std::array<double, 3> WeightsInside(const std::array<PlainVector, 3>& w, size_t count) {
+  if (count == 1) return {1, 0, 0};
+  const PlainVector e = w[1] - w[0];
+  std::array<double, 3> parts = {Dot(e, w[1]), -Dot(e, w[0]), 0};
+  if (count == 3) {
+    const PlainVector f = w[2] - w[0];
+    const PlainVector n = Cross(e, f);
+    parts = {Dot(Cross(w[1], w[2] - w[1]), n), Dot(Cross(f, w[0]), n), Dot(Cross(w[0], e), n)};
+  }
+  for (double& part : parts) part = std::max(part, 0.0);
+  const double scale = 1 / (parts[0] + parts[1] + parts[2]);
+  for (double& part : parts) part *= scale;
+  return parts;
+}
+
+// Bounds the distance by the end of a search: by the reach of A - B along n, and by the nearest
+// point of the simplex.
+SeparationBounds BoundsAtEnd(const FloatPair& pair, const PlainVector& n, double reach,
+                             std::span<const VertexPair> simplex) {
+  SeparationBounds bounds;
+  // In units near the size.
+  const double unit = UnitOf(pair.size());
+  const double per_unit = 1 / unit;
+  std::array<PlainVector, 3> w;
+  for (size_t i = 0; i < simplex.size(); ++i) w[i] = per_unit * pair.Difference(simplex[i]);
+  bounds.point.weights = WeightsInside(w, simplex.size());
+  PlainVector point;
+  for (size_t i = 0; i < simplex.size(); ++i) {
+    point = point + bounds.point.weights[i] * w[i];
+    bounds.point.pairs[i] = simplex[i];
+  }
+  bounds.point.count = static_cast<uint32_t>(simplex.size());
+  bounds.point_length = Norm(point) * unit;
+  bounds.high = bounds.point_length + kCombinationErrorFactor * pair.size();
+  const double length = Norm(n);
+  bounds.low = std::min(LowOf(pair, reach / length), bounds.high);
+  bounds.direction = PlainVector(n.x / length, n.y / length, n.z / length);
+  return bounds;
+}
+
 }  // namespace
 
 SeparationBounds BoundDistance(const FloatPair& pair, const Vector& n,
@@ -184,9 +206,9 @@ SeparationBounds BoundDistance(const FloatPair& pair, const Vector& n,
                                double reach) {
   HULLD_CHECK(pair.usable());
   HULLD_CHECK(start.size() <= 3);
-  if (reach < INFINITY && !start.empty()) {
-    Walk walk(pair, goal);
-    if (walk.Meets(n, reach, start)) return walk.bounds();
+  if (reach < INFINITY) {
+    const SeparationBounds bounds = BoundsAtEnd(pair, n, reach, start);
+    if (goal.Met(bounds.low, bounds.high)) return bounds;
   }
   if (SmallPair<8>::Fits(pair)) return WalkSmall<8>(pair, n, start, goal);
   if (SmallPair<16>::Fits(pair)) return WalkSmall<16>(pair, n, start, goal);

@@ -50,21 +50,31 @@ template <typename SmallPair>
   w = LaneVector(pair.Difference(farthest.pair));
 }
 
-// A search for a FloatPair or a SmallPair.
+// Reduces a flat tetrahedron. Returns the direction toward the origin. Not inlined, to keep the
+// search short.
+[[gnu::noinline]] PlainVector TowardFromNearestFace(Simplex& simplex) {
+  simplex.ReduceToNearestFace();
+  return NearestOnTriangle(simplex.corner(0), simplex.corner(1), simplex.corner(2)).toward;
+}
+
+// A search for a FloatPair or a SmallPair. `simplex`: empty. It is not a member, so that compilers
+// keep the members in registers.
 template <typename Pair>
 class FloatSearch {
  public:
-  FloatSearch(const Pair& pair, double tolerance, double max_error)
-      : pair_(pair), tolerance_(tolerance), max_error_(max_error) {}
+  FloatSearch(const Pair& pair, double tolerance, double max_error, Simplex& simplex)
+      : pair_(pair), tolerance_(tolerance), max_error_(max_error), simplex_(simplex) {}
 
-  FloatSearchResult Run(const PlainVector& first) {
+  void Run(const PlainVector& first, FloatSearchResult& result) {
     LaneVector n(IsZero(first) ? PlainVector(1, 0, 0) : first);
-    while (result_.directions_tried < kMaxDirections && Explore(n)) {
+    while (tried_ < kMaxDirections && Explore(n)) {
     }
-    if (result_.verdict != FloatVerdict::kSeparated) result_.axis = along_;
-    result_.pair_count = simplex_.count();
-    for (uint32_t i = 0; i < simplex_.count(); ++i) result_.pairs[i] = simplex_.pair(i);
-    return result_;
+    result.verdict = verdict_;
+    result.axis = verdict_ == FloatVerdict::kSeparated ? axis_ : along_;
+    result.reach = reach_;
+    result.directions_tried = tried_;
+    result.pair_count = simplex_.count();
+    for (uint32_t i = 0; i < simplex_.count(); ++i) result.pairs[i] = simplex_.pair(i);
   }
 
  private:
@@ -76,20 +86,20 @@ class FloatSearch {
       n = LaneVector(1 / UnitOf(largest) * n.plain());
       largest = LargestComponent(n.plain());
     }
-    ++result_.directions_tried;
+    ++tried_;
     FloatPair::Support farthest;
     LaneVector w;
     FindFarthest(pair_, n, farthest, w);
     const double error = kSupportErrorFactor * largest * pair_.size();
     along_ = n.plain();
     if (farthest.value < -error) {
-      result_.verdict = FloatVerdict::kSeparated;
-      result_.axis = along_;
-      result_.reach = farthest.value;
+      verdict_ = FloatVerdict::kSeparated;
+      axis_ = along_;
+      reach_ = farthest.value;
       if (max_error_ == kEndsAtSign) return false;
     }
     const bool is_first = simplex_.count() == 0;
-    if (result_.verdict == FloatVerdict::kSeparated && !is_first) {
+    if (verdict_ == FloatVerdict::kSeparated && !is_first) {
       // The direction leads across the corners, so this is the width of the bounds times its
       // length.
       const double ahead = farthest.value - Dot(along_, simplex_.corner(simplex_.count() - 1));
@@ -113,15 +123,15 @@ class FloatSearch {
         outside = simplex_.Add(w, farthest.pair, n);
       }
     }
-    if (result_.verdict == FloatVerdict::kSeparated) {
+    if (verdict_ == FloatVerdict::kSeparated) {
       // If the hulls are separated, only a flat tetrahedron seems to contain the origin.
-      if (!outside) n = LaneVector(TowardFromNearestFace());
+      if (!outside) n = LaneVector(TowardFromNearestFace(simplex_));
       return progress;
     }
     if (!outside) {
       if (HoldsOrigin(pair_, simplex_.corner(0), simplex_.corner(1), simplex_.corner(2),
                       simplex_.corner(3))) {
-        result_.verdict = FloatVerdict::kOverlapping;
+        verdict_ = FloatVerdict::kOverlapping;
         return false;
       }
       if (tolerance_ == 0) return false;
@@ -129,17 +139,10 @@ class FloatSearch {
       n = LaneVector(simplex_.ReduceToNearestFace());
     }
     if (tolerance_ > 0 && IsWithinTolerance(along_, farthest, error)) {
-      result_.verdict = FloatVerdict::kWithinTolerance;
+      verdict_ = FloatVerdict::kWithinTolerance;
       return false;
     }
     return progress && !at_corner;
-  }
-
-  // Reduces a flat tetrahedron. Returns the direction toward the origin. Not inlined, to keep the
-  // search short.
-  [[gnu::noinline]] PlainVector TowardFromNearestFace() {
-    simplex_.ReduceToNearestFace();
-    return NearestOnTriangle(simplex_.corner(0), simplex_.corner(1), simplex_.corner(2)).toward;
   }
 
   // Returns true if |separation| <= tolerance is certain: A - B has a point within the tolerance of
@@ -160,47 +163,55 @@ class FloatSearch {
   const Pair& pair_;
   const double tolerance_;
   const double max_error_;
-  Simplex simplex_;
+  Simplex& simplex_;
+  uint64_t tried_ = 0;
   // The last direction tried.
   PlainVector along_;
+  // Separated: the last axis that showed it, and the reach along it.
+  PlainVector axis_;
+  double reach_ = INFINITY;
   // With a tolerance: true if A - B is known to reach no farther than the tolerance beyond the
   // origin along some direction.
   bool reach_is_short_ = false;
-  FloatSearchResult result_;
+  FloatVerdict verdict_ = FloatVerdict::kUndecided;
 };
 
 // Pair: a FloatPair or a SmallPair.
 template <typename Pair>
-FloatSearchResult SearchPortably(const FloatPair& pair, double tolerance, const PlainVector& first,
-                                 double max_error) {
+void SearchPortably(const FloatPair& pair, double tolerance, const PlainVector& first,
+                    double max_error, FloatSearchResult& result) {
   const Pair own(pair);
-  return FloatSearch(own, tolerance, max_error).Run(first);
+  Simplex simplex;
+  FloatSearch(own, tolerance, max_error, simplex).Run(first, result);
 }
 
 #ifdef HULLD_HAS_AVX2_PATH
 // The entire call tree is compiled for AVX2, so that lanes stay in registers.
 template <typename Pair>
-__attribute__((target("avx2"), flatten)) FloatSearchResult SearchByAvx2(const FloatPair& pair,
-                                                                        double tolerance,
-                                                                        const PlainVector& first,
-                                                                        double max_error) {
+__attribute__((target("avx2"), flatten)) void SearchByAvx2(const FloatPair& pair, double tolerance,
+                                                           const PlainVector& first,
+                                                           double max_error,
+                                                           FloatSearchResult& result) {
   const Pair own(pair);
-  return FloatSearch(own, tolerance, max_error).Run(first);
+  Simplex simplex;
+  FloatSearch(own, tolerance, max_error, simplex).Run(first, result);
 }
 #else
 template <typename Pair>
-FloatSearchResult SearchByAvx2(const FloatPair& pair, double tolerance, const PlainVector& first,
-                               double max_error) {
-  return SearchPortably<Pair>(pair, tolerance, first, max_error);
+void SearchByAvx2(const FloatPair& pair, double tolerance, const PlainVector& first,
+                  double max_error, FloatSearchResult& result) {
+  SearchPortably<Pair>(pair, tolerance, first, max_error, result);
 }
 #endif
 
 template <typename Pair>
-FloatSearchResult Search(const FloatPair& pair, double tolerance, const PlainVector& first,
-                         double max_error) {
-  return CurrentSimdPath() == SimdPath::kAvx2
-             ? SearchByAvx2<Pair>(pair, tolerance, first, max_error)
-             : SearchPortably<Pair>(pair, tolerance, first, max_error);
+void Search(const FloatPair& pair, double tolerance, const PlainVector& first, double max_error,
+            FloatSearchResult& result) {
+  if (CurrentSimdPath() == SimdPath::kAvx2) {
+    SearchByAvx2<Pair>(pair, tolerance, first, max_error, result);
+  } else {
+    SearchPortably<Pair>(pair, tolerance, first, max_error, result);
+  }
 }
 
 }  // namespace
@@ -208,9 +219,15 @@ FloatSearchResult Search(const FloatPair& pair, double tolerance, const PlainVec
 FloatSearchResult SearchInFloatingPoint(const FloatPair& pair, double tolerance,
                                         const PlainVector& first, double max_error) {
   HULLD_DCHECK(pair.usable());
-  if (SmallPair<8>::Fits(pair)) return Search<SmallPair<8>>(pair, tolerance, first, max_error);
-  if (SmallPair<16>::Fits(pair)) return Search<SmallPair<16>>(pair, tolerance, first, max_error);
-  return Search<FloatPair>(pair, tolerance, first, max_error);
+  FloatSearchResult result;
+  if (SmallPair<8>::Fits(pair)) {
+    Search<SmallPair<8>>(pair, tolerance, first, max_error, result);
+  } else if (SmallPair<16>::Fits(pair)) {
+    Search<SmallPair<16>>(pair, tolerance, first, max_error, result);
+  } else {
+    Search<FloatPair>(pair, tolerance, first, max_error, result);
+  }
+  return result;
 }
 
 FloatSearchResult TryCached(const FloatPair& pair, const PairCache& cache) {

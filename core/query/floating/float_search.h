@@ -19,13 +19,13 @@ struct FloatSearchResult {
   // Separated: n.(a - b) < 0 throughout, exactly as given. Otherwise the last direction tried, a
   // hint.
   Vector axis = Vector::Zero();
-  // Separated: the greatest n.(a - b), within FloatPair::SupportError.
-  double reach = INFINITY;
   // Overlapping: four pairs; the hull of their differences contains the origin strictly inside.
   // Otherwise the end of the search, a hint; separated: at most three.
   uint32_t pair_count = 0;
   std::array<VertexPair, 4> pairs = {};
   uint64_t directions_tried = 0;
+  // Separated: the greatest n.(a - b) for the axis n, within FloatPair::SupportError.
+  double reach = INFINITY;
 };
 
 // A `max_error` that ends a search at the sign of the separation.
