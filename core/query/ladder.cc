@@ -48,9 +48,13 @@ bool CentersMaySettle(const FloatPair& pair, const PlainVector& n) {
   const QueryHull& a = pair.a().query_hull();
   const QueryHull& b = pair.b().query_hull();
   if (!a.center_bounds().coarse() && !b.center_bounds().coarse()) return true;
-  // Coarse bounds settle little except overlaps of hulls with centers this close.
-  const double reach = a.radius() + b.radius();
-  return 4 * SquaredNorm(n) < reach * reach;
+  // Coarse bounds settle little except overlaps of hulls with centers this close. Observed: of
+  // random pairs of 8 vertices, they settle 1 % of the deep ones with centers farther apart, and
+  // none that nearly touch.
+  constexpr uint32_t kFewPoints = 8;
+  const bool few = a.point_count() <= kFewPoints && b.point_count() <= kFewPoints;
+  const double reach = (few ? 0.4 : 0.5) * (a.radius() + b.radius());
+  return SquaredNorm(n) < reach * reach;
 }
 
 // Returns the relation if the bounds about the centers prove it. Otherwise sets `first` to the
@@ -181,7 +185,7 @@ void Remember(const FloatSearchResult& found, PairCache& cache) {
       return true;
     }
   }
-  found = SearchInFloatingPoint(pair, tolerance, first, max_error);
+  SearchInFloatingPoint(pair, tolerance, first, max_error, found);
   decision.directions_tried += found.directions_tried;
   if (cache != nullptr) Remember(found, *cache);
   if (found.verdict == FloatVerdict::kUndecided) return false;

@@ -216,10 +216,9 @@ void Search(const FloatPair& pair, double tolerance, const PlainVector& first, d
 
 }  // namespace
 
-FloatSearchResult SearchInFloatingPoint(const FloatPair& pair, double tolerance,
-                                        const PlainVector& first, double max_error) {
+void SearchInFloatingPoint(const FloatPair& pair, double tolerance, const PlainVector& first,
+                           double max_error, FloatSearchResult& result) {
   HULLD_DCHECK(pair.usable());
-  FloatSearchResult result;
   if (SmallPair<8>::Fits(pair)) {
     Search<SmallPair<8>>(pair, tolerance, first, max_error, result);
   } else if (SmallPair<16>::Fits(pair)) {
@@ -227,7 +226,6 @@ FloatSearchResult SearchInFloatingPoint(const FloatPair& pair, double tolerance,
   } else {
     Search<FloatPair>(pair, tolerance, first, max_error, result);
   }
-  return result;
 }
 
 FloatSearchResult TryCached(const FloatPair& pair, const PairCache& cache) {

@@ -40,8 +40,16 @@ inline constexpr double kEndsAtSign = -1;
 // tetrahedron of vertices of A - B by more than the error of its volumes. WITHIN_TOLERANCE: a point
 // of A - B and a supporting plane of A - B are both within the tolerance of the origin. `first`:
 // the initial direction, for example from A's center to B's. Requires: pair.usable().
-FloatSearchResult SearchInFloatingPoint(const FloatPair& pair, double tolerance,
-                                        const PlainVector& first, double max_error = kEndsAtSign);
+// Fills `result`, which must be newly constructed.
+void SearchInFloatingPoint(const FloatPair& pair, double tolerance, const PlainVector& first,
+                           double max_error, FloatSearchResult& result);
+inline FloatSearchResult SearchInFloatingPoint(const FloatPair& pair, double tolerance,
+                                               const PlainVector& first,
+                                               double max_error = kEndsAtSign) {
+  FloatSearchResult result;
+  SearchInFloatingPoint(pair, tolerance, first, max_error, result);
+  return result;
+}
 
 // Tries to prove the cached suggestion of an earlier query at the current poses; the result is
 // undecided if this fails. In that case, if hulls that touched before may touch along the same axis
