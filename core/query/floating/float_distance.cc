@@ -175,7 +175,8 @@ std::array<double, 3> WeightsInside(const std::array<PlainVector, 3>& w, size_t 
 }
 
 // Bounds the distance by the end of a search: by the reach of A - B along n, and by the nearest
-// point of the simplex.
+// point of the simplex. The length of n and the quotient err by 4 u of themselves in total, less
+// than kReachErrorFactor allows for the length of a unit vector.
 SeparationBounds BoundsAtEnd(const FloatPair& pair, const PlainVector& n, double reach,
                              std::span<const VertexPair> simplex) {
   SeparationBounds bounds;

@@ -204,11 +204,17 @@ void SearchByAvx2(const FloatPair& pair, double tolerance, const PlainVector& fi
 }
 #endif
 
-template <typename Pair>
+#ifdef HULLD_HAS_LANE_LOOKUP
+using EightForAvx2 = SmallPair<8, true>;
+#else
+using EightForAvx2 = SmallPair<8>;
+#endif
+
+template <typename Pair, typename PairForAvx2 = Pair>
 void Search(const FloatPair& pair, double tolerance, const PlainVector& first, double max_error,
             FloatSearchResult& result) {
   if (CurrentSimdPath() == SimdPath::kAvx2) {
-    SearchByAvx2<Pair>(pair, tolerance, first, max_error, result);
+    SearchByAvx2<PairForAvx2>(pair, tolerance, first, max_error, result);
   } else {
     SearchPortably<Pair>(pair, tolerance, first, max_error, result);
   }
@@ -220,7 +226,7 @@ void SearchInFloatingPoint(const FloatPair& pair, double tolerance, const PlainV
                            double max_error, FloatSearchResult& result) {
   HULLD_DCHECK(pair.usable());
   if (SmallPair<8>::Fits(pair)) {
-    Search<SmallPair<8>>(pair, tolerance, first, max_error, result);
+    Search<SmallPair<8>, EightForAvx2>(pair, tolerance, first, max_error, result);
   } else if (SmallPair<16>::Fits(pair)) {
     Search<SmallPair<16>>(pair, tolerance, first, max_error, result);
   } else {

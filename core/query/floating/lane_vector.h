@@ -28,6 +28,38 @@ using LaneIds = int64_t __attribute__((vector_size(32)));
       reinterpret_cast<Lanes>(reinterpret_cast<LaneIds>(lanes) | reinterpret_cast<LaneIds>(turned));
 }
 
+// A look-up of one of eight doubles that stays in vector registers: a load would wait for its index
+// to leave them.
+#if defined(__GNUC__) && !defined(__clang__)
+#define HULLD_HAS_LANE_LOOKUP
+class LaneLookup {
+ public:
+  // index: the same number below 8 in all lanes.
+  [[gnu::always_inline]] explicit LaneLookup(const LaneIds& index) {
+    const Halves once = reinterpret_cast<Halves>(index);
+    const Halves twice = __builtin_shufflevector(once, once, 0, 0, 2, 2, 4, 4, 6, 6);
+    halves_ = (twice + twice) | Halves{0, 1, 0, 1, 0, 1, 0, 1};
+    // The sign shows if the index is at least 4.
+    upper_ = index << 61;
+  }
+  // Sets every lane to the double.
+  [[gnu::always_inline]] void Find(const double* table, Lanes& found) const {
+    Halves low, high;
+    std::memcpy(&low, table, sizeof low);
+    std::memcpy(&high, table + 4, sizeof high);
+    low = __builtin_shuffle(low, halves_);
+    high = __builtin_shuffle(high, halves_);
+    const LaneIds zero = {0, 0, 0, 0};
+    found = upper_ < zero ? reinterpret_cast<Lanes>(high) : reinterpret_cast<Lanes>(low);
+  }
+
+ private:
+  using Halves = int32_t __attribute__((vector_size(32)));
+  Halves halves_;
+  LaneIds upper_;
+};
+#endif
+
 // A vector with each coordinate in all four lanes of a register.
 struct LaneVector {
   LaneVector() = default;

@@ -21,8 +21,9 @@ namespace hulld {
 //
 // kMaxVertices: the maximum number of vertices of either hull; more would need separate bounds
 // (kSupportErrorFactor). Positions have the same bits as in FloatPair. Everything is inlined, so
-// that it is compiled for the registers of the calling search.
-template <uint32_t kMaxVertices>
+// that it is compiled for the registers of the calling search. kLooksUp: positions are looked up in
+// registers (LaneLookup), with the same result.
+template <uint32_t kMaxVertices, bool kLooksUp = false>
 class SmallPair {
   static_assert(kMaxVertices == 8 || kMaxVertices == 16);
 
@@ -52,17 +53,20 @@ class SmallPair {
   }
   // Like Farthest above; also sets w to the vertex.
   [[gnu::always_inline]] FloatPair::Support Farthest(const LaneVector& n, LaneVector& w) const {
-    const VertexPair place = PlaceAlong(n);
-    const auto difference = [&](const double* a, const double* b, Lanes& lanes)
-        __attribute__((always_inline)) {
-      Lanes against;
-      Broadcast(a[place.a], lanes);
-      Broadcast(b[place.b], against);
-      lanes += against;
-    };
-    difference(a_.x, against_b_.x, w.x);
-    difference(a_.y, against_b_.y, w.y);
-    difference(a_.z, against_b_.z, w.z);
+    VertexPair place;
+    if constexpr (kLooksUp) {
+#ifdef HULLD_HAS_LANE_LOOKUP
+      static_assert(kMaxVertices == 8);
+      LaneIds best_a, best_b;
+      a_.BestOfAll(n, best_a);
+      against_b_.BestOfAll(n, best_b);
+      AddUp(LaneLookup(best_a), LaneLookup(best_b), w);
+      place = {PlaceOf(best_a[0]), PlaceOf(best_b[0])};
+#endif
+    } else {
+      place = PlaceAlong(n);
+      AddUp(Loading{place.a}, Loading{place.b}, w);
+    }
     const Lanes value = (n.x * w.x + n.y * w.y) + n.z * w.z;
     return {VertexAt(place), value[0]};
   }
@@ -75,6 +79,29 @@ class SmallPair {
  private:
   // The low bits of a value, which contain its vertex number.
   static constexpr int64_t kIdMask = kMaxVertices - 1;
+
+  // The interface of LaneLookup, by loads.
+  struct Loading {
+    [[gnu::always_inline]] void Find(const double* table, Lanes& found) const {
+      Broadcast(table[place], found);
+    }
+    uint32_t place;
+  };
+
+  // Sets w to the difference of two looked-up vertices.
+  template <typename Lookup>
+  [[gnu::always_inline]] void AddUp(const Lookup& of_a, const Lookup& of_b, LaneVector& w) const {
+    Lanes x, y, z;
+    of_a.Find(a_.x, w.x);
+    of_b.Find(against_b_.x, x);
+    of_a.Find(a_.y, w.y);
+    of_b.Find(against_b_.y, y);
+    of_a.Find(a_.z, w.z);
+    of_b.Find(against_b_.z, z);
+    w.x += x;
+    w.y += y;
+    w.z += z;
+  }
 
   static uint32_t PlaceOf(int64_t numbered) { return static_cast<uint32_t>(numbered & kIdMask); }
 
@@ -135,6 +162,15 @@ class SmallPair {
         Number(block, n_x, n_y, n_z, others);
         best = best > others ? best : others;
       }
+    }
+    // Sets all lanes to the number of the vertex with the largest value.
+    [[gnu::always_inline]] void BestOfAll(const LaneVector& n, LaneIds& all) const {
+      Lanes best;
+      Best(n.x, n.y, n.z, best);
+      const Lanes rest = __builtin_shufflevector(best, best, 2, 3, 0, 1);
+      best = best > rest ? best : rest;
+      const Lanes turned = __builtin_shufflevector(best, best, 1, 0, 3, 2);
+      all = reinterpret_cast<LaneIds>(best > turned ? best : turned) & kIdMask;
     }
     [[gnu::always_inline]] void Number(uint32_t first, const Lanes& n_x, const Lanes& n_y,
                                        const Lanes& n_z, Lanes& numbered) const {
