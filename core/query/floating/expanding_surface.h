@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <memory_resource>
 #include <optional>
 #include <vector>
 
@@ -22,8 +23,12 @@ class ExpandingSurface {
     bool alive = true;
   };
 
+  // `memory`: of the facets and the lists.
+  explicit ExpandingSurface(std::pmr::memory_resource* memory = std::pmr::get_default_resource())
+      : facets_(memory), horizon_(memory), stack_(memory) {}
+
   // All facets. Dead facets keep their places until Compact().
-  const std::vector<Facet>& facets() const { return facets_; }
+  const std::pmr::vector<Facet>& facets() const { return facets_; }
 
   // True if there are many facets and most of them are dead.
   bool HasManyDead() const { return facets_.size() >= kMinCompacted && dead_ > facets_.size() / 2; }
@@ -123,10 +128,10 @@ class ExpandingSurface {
     return first;
   }
 
-  std::vector<Facet> facets_;
+  std::pmr::vector<Facet> facets_;
   size_t dead_ = 0;
-  std::vector<Side> horizon_;
-  std::vector<Side> stack_;
+  std::pmr::vector<Side> horizon_;
+  std::pmr::vector<Side> stack_;
 };
 
 }  // namespace hulld

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <memory_resource>
 #include <optional>
 #include <span>
 #include <unordered_set>
@@ -38,6 +40,29 @@ struct Plane {
   double distance = 0;
   // True if the corners are certainly counter-clockwise seen from outside, about the origin.
   bool outward = false;
+};
+
+// Memory that is part of this object, and from the heap once that is used up. Memory of the object
+// is not used again, so callers reserve the usual sizes.
+class OwnMemory : public std::pmr::memory_resource {
+ private:
+  void* do_allocate(size_t bytes, size_t alignment) override {
+    const size_t at = (used_ + alignment - 1) & ~(alignment - 1);
+    if (at + bytes > sizeof own_) return heap_->allocate(bytes, alignment);
+    used_ = at + bytes;
+    return own_ + at;
+  }
+  void do_deallocate(void* p, size_t bytes, size_t alignment) override {
+    const auto at = reinterpret_cast<uintptr_t>(p) - reinterpret_cast<uintptr_t>(own_);
+    if (at >= sizeof own_) heap_->deallocate(p, bytes, alignment);
+  }
+  bool do_is_equal(const std::pmr::memory_resource& other) const noexcept override {
+    return this == &other;
+  }
+
+  std::pmr::memory_resource* const heap_ = std::pmr::new_delete_resource();
+  size_t used_ = 0;
+  alignas(std::max_align_t) std::byte own_[20 * 1024];
 };
 
 class Expansion {
@@ -284,12 +309,13 @@ class Expansion {
   StopPoll& poll_;
   const double unit_;
   const double per_unit_;
-  std::vector<Corner> corners_;
+  OwnMemory memory_;
+  std::pmr::vector<Corner> corners_{&memory_};
   // Corners from kMaxScanned on.
   std::unordered_set<uint64_t> late_;
-  ExpandingSurface surface_;
-  std::vector<Plane> planes_;
-  std::vector<Entry> heap_;
+  ExpandingSurface surface_{&memory_};
+  std::pmr::vector<Plane> planes_{&memory_};
+  std::pmr::vector<Entry> heap_{&memory_};
   bool intact_ = true;
   SeparationBounds bounds_;
 };
