@@ -158,41 +158,50 @@ SeparationBounds WalkSmall(const FloatPair& pair, const PlainVector& n,
 
 // Returns the weights of the corners of a simplex in its point nearest to the origin, if that is
 // inside it: not negative, with a sum within 8 u of 1. Otherwise the point may be a farther one.
-// NaN if rounding leaves no positive weight.
-std::array<double, 3> WeightsInside(const std::array<PlainVector, 3>& w, size_t count) {
+// NaN if rounding leaves no positive weight. count: of the corners, 1 to 3; the others are not
+// used.
+std::array<double, 3> WeightsInside(const PlainVector& p, const PlainVector& q,
+                                    const PlainVector& r, size_t count) {
   if (count == 1) return {1, 0, 0};
-  const PlainVector e = w[1] - w[0];
-  std::array<double, 3> parts = {Dot(e, w[1]), -Dot(e, w[0]), 0};
+  const PlainVector e = q - p;
+  double of_p = Dot(e, q);
+  double of_q = -Dot(e, p);
+  double of_r = 0;
   if (count == 3) {
-    const PlainVector f = w[2] - w[0];
+    const PlainVector f = r - p;
     const PlainVector n = Cross(e, f);
-    parts = {Dot(Cross(w[1], w[2] - w[1]), n), Dot(Cross(f, w[0]), n), Dot(Cross(w[0], e), n)};
+    of_p = Dot(Cross(q, r - q), n);
+    of_q = Dot(Cross(f, p), n);
+    of_r = Dot(Cross(p, e), n);
   }
-  for (double& part : parts) part = std::max(part, 0.0);
-  const double scale = 1 / (parts[0] + parts[1] + parts[2]);
-  for (double& part : parts) part *= scale;
-  return parts;
+  of_p = std::max(of_p, 0.0);
+  of_q = std::max(of_q, 0.0);
+  of_r = std::max(of_r, 0.0);
+  const double scale = 1 / (of_p + of_q + of_r);
+  return {scale * of_p, scale * of_q, scale * of_r};
 }
 
 // Bounds the distance by the end of a search: by the reach of A - B along n, and by the nearest
 // point of the simplex. The length of n and the quotient err by 4 u of themselves in total, less
-// than kReachErrorFactor allows for the length of a unit vector.
+// than kReachErrorFactor allows for the length of a unit vector. Requires: `simplex` is not empty.
 SeparationBounds BoundsAtEnd(const FloatPair& pair, const PlainVector& n, double reach,
                              std::span<const VertexPair> simplex) {
   SeparationBounds bounds;
+  bounds.point.count = static_cast<uint32_t>(simplex.size());
+  // Without loops, so that the corners stay in registers. Repeats the last one.
+  const VertexPair first = simplex[0];
+  const VertexPair second = simplex[simplex.size() > 1 ? 1 : 0];
+  const VertexPair third = simplex.back();
+  bounds.point.pairs = {first, second, third};
   // In units near the size.
   const double unit = UnitOf(pair.size());
   const double per_unit = 1 / unit;
-  std::array<PlainVector, 3> w;
-  for (size_t i = 0; i < simplex.size(); ++i) w[i] = per_unit * pair.Difference(simplex[i]);
-  bounds.point.weights = WeightsInside(w, simplex.size());
-  PlainVector point;
-  for (size_t i = 0; i < simplex.size(); ++i) {
-    point = point + bounds.point.weights[i] * w[i];
-    bounds.point.pairs[i] = simplex[i];
-  }
-  bounds.point.count = static_cast<uint32_t>(simplex.size());
-  bounds.point_length = Norm(point) * unit;
+  const PlainVector p = per_unit * pair.Difference(first);
+  const PlainVector q = per_unit * pair.Difference(second);
+  const PlainVector r = per_unit * pair.Difference(third);
+  const std::array<double, 3> weights = WeightsInside(p, q, r, simplex.size());
+  bounds.point.weights = weights;
+  bounds.point_length = Norm((weights[0] * p + weights[1] * q) + weights[2] * r) * unit;
   bounds.high = bounds.point_length + kCombinationErrorFactor * pair.size();
   const double length = Norm(n);
   bounds.low = std::min(LowOf(pair, reach / length), bounds.high);
@@ -207,7 +216,7 @@ SeparationBounds BoundDistance(const FloatPair& pair, const Vector& n,
                                double reach) {
   HULLD_CHECK(pair.usable());
   HULLD_CHECK(start.size() <= 3);
-  if (reach < INFINITY) {
+  if (reach < INFINITY && !start.empty()) {
     const SeparationBounds bounds = BoundsAtEnd(pair, n, reach, start);
     if (goal.Met(bounds.low, bounds.high)) return bounds;
   }
