@@ -218,7 +218,8 @@ SeparationBounds BoundDistance(const FloatPair& pair, const Vector& n,
   HULLD_CHECK(start.size() <= 3);
   if (reach < INFINITY && !start.empty()) {
     const SeparationBounds bounds = BoundsAtEnd(pair, n, reach, start);
-    if (goal.Met(bounds.low, bounds.high)) return bounds;
+    // Without a point, `high` is NaN.
+    if (bounds.high < INFINITY && goal.Met(bounds.low, bounds.high)) return bounds;
   }
   if (SmallPair<8>::Fits(pair)) return WalkSmall<8>(pair, n, start, goal);
   if (SmallPair<16>::Fits(pair)) return WalkSmall<16>(pair, n, start, goal);

@@ -29,7 +29,7 @@ using LaneIds = int64_t __attribute__((vector_size(32)));
 }
 
 // A look-up of one of eight doubles that stays in vector registers: a load would wait for its index
-// to leave them.
+// to leave them. Only GCC has shuffles by variable indices; without AVX2 they are slow.
 #if defined(__GNUC__) && !defined(__clang__)
 #define HULLD_HAS_LANE_LOOKUP
 class LaneLookup {

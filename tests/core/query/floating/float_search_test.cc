@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <iterator>
+#include <span>
+
 #include "core/query/collision.h"
 #include "core/query/floating/float_distance.h"
 #include "tests/core/checks/oracle_bridge.h"
@@ -50,6 +53,49 @@ TEST(FloatSearch, ASeparatedPairIsSearchedUntilTheErrorIsReached) {
     }
   }
   for (size_t i = 1; i < std::size(kErrors); ++i) EXPECT_GT(directions[i], directions[i - 1]) << i;
+}
+
+// The bounds from the end of a search contain the distance, whatever part of the simplex is kept,
+// and are as close as those of a walk if it is the whole one.
+TEST(FloatSearch, TheEndOfASearchBoundsTheDistance) {
+  Random random(20261128);
+  int counts[4] = {};
+  for (int round = 0; round < 400; ++round) {
+    const Hull hull_a = BuildHull(RandomOnSphere(random, 4 + round % 5, 1));
+    const Hull hull_b = BuildHull(RandomOnSphere(random, round % 2 == 0 ? 8 : 100, 1));
+    const QueryHull query_a(hull_a);
+    const QueryHull query_b(hull_b);
+    Pose X_WB;
+    X_WB.t = Vector(random.Real(1.5, 3), random.Real(-1, 1), random.Real(-1, 1));
+    const PlacedHull a = *PlacedHull::Make(query_a, Pose());
+    const PlacedHull b = *PlacedHull::Make(query_b, X_WB);
+    const FloatPair pair(a, b);
+    const FloatSearchResult found = SearchInFloatingPoint(pair, 0, -pair.CenterDifference(), 0);
+    if (found.verdict != FloatVerdict::kSeparated) continue;
+    ++counts[found.pair_count];
+    SeparationGoal close;
+    close.relative_error = 1e-12;
+    close.size = 2;
+    const SeparationBounds walked = BoundDistance(pair, found.axis, {}, close);
+    ASSERT_TRUE(close.Met(walked.low, walked.high)) << "round " << round;
+    SeparationGoal any;
+    any.absolute_error = 1e9;
+    for (uint32_t count = 1; count <= found.pair_count; ++count) {
+      const std::span<const VertexPair> simplex = std::span(found.pairs).first(count);
+      const SeparationBounds bounds = BoundDistance(pair, found.axis, simplex, any, found.reach);
+      EXPECT_LE(bounds.low, walked.high) << "round " << round;
+      EXPECT_GE(bounds.high, walked.low) << "round " << round;
+      double sum = 0;
+      for (uint32_t i = 0; i < bounds.point.count; ++i) {
+        EXPECT_GE(bounds.point.weights[i], 0);
+        sum += bounds.point.weights[i];
+      }
+      EXPECT_NEAR(sum, 1, 1e-15);
+      if (count < found.pair_count) continue;
+      EXPECT_TRUE(close.Met(bounds.low, bounds.high)) << "round " << round;
+    }
+  }
+  for (int count = 1; count <= 3; ++count) EXPECT_GT(counts[count], 0) << count;
 }
 
 }  // namespace
