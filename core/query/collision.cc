@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <compare>
+#include <cstddef>
 #include <limits>
 #include <span>
 #include <utility>
