@@ -45,12 +45,13 @@ TaskPool::~TaskPool() {
   for (Thread& thread : threads_) thread.join();
 }
 
-void TaskPool::Submit(std::function<void()> task, ClientId client) {
+void TaskPool::Submit(std::function<void()> task, ClientId client, bool is_last) {
   NoteSingleCall();
   {
     const std::lock_guard lock(mutex_);
     single_tasks_.Push(client, {std::move(task), SteadyClock::now(), false});
     NoteWaiting();
+    if (is_last && single_tasks_.size() == 1) return;
   }
   ready_.notify_one();
 }

@@ -80,8 +80,10 @@ class TaskPool {
 
   size_t threads() const { return threads_.size(); }
 
-  // Queues a task ahead of all slices. client: the client that waits for it.
-  void Submit(std::function<void()> task, ClientId client = kNoClient);
+  // Queues a task ahead of all slices. client: the client that waits for it. is_last: true if this
+  // is the last action of a task of this pool, whose thread then takes the queued task if it is the
+  // only one, so that no other thread is woken.
+  void Submit(std::function<void()> task, ClientId client = kNoClient, bool is_last = false);
 
   // Records a single call answered without this pool, so that slices leave it a core. Cost: ~30 ns.
   void NoteSingleCall();

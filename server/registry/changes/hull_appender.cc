@@ -215,7 +215,7 @@ void LocalChanges::RunNextChunk(const HullPointer& hull) {
   hull->state.EndWork();
   hull->NoteUse();
   state_.memory.Evict(locked);
-  Advance(locked, hull);
+  Advance(locked, hull, true);
 }
 
 // Refuses the chunks of a hull that can no longer grow.

@@ -291,8 +291,9 @@ void LocalChanges::Submit(Locked& locked, const HullPointer& hull, Change change
                     });
 }
 
-// Resumes the tasks that wait for the hull.
-void LocalChanges::Advance(Locked& locked, const HullPointer& hull) {
+// Resumes the tasks that wait for the hull. is_last: true if the release of the mutex is the last
+// action of a task of the writers.
+void LocalChanges::Advance(Locked& locked, const HullPointer& hull, bool is_last) {
   hull->changed.notify_all();
   while (hull->state.quiet() && !hull->exclusive.empty()) {
     const auto next = std::move(hull->exclusive.front());
@@ -313,7 +314,10 @@ void LocalChanges::Advance(Locked& locked, const HullPointer& hull) {
   // These chunks depend on the committed state.
   if (hull->state.in_flight() > 0 && (repeated || next.chunk.if_revision.has_value())) return;
   hull->state.Schedule();
-  writers_.Submit([this, hull] { RunNextChunk(hull); }, next.session.client);
+  // The task acquires the mutex, so it would only wait if it started before the release.
+  locked.Afterwards([this, hull, is_last, client = next.session.client] {
+    writers_.Submit([this, hull] { RunNextChunk(hull); }, client, is_last);
+  });
 }
 
 void LocalChanges::OnPeerChange(Locked& /*locked*/, const std::string& /*id*/,

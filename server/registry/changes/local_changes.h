@@ -112,7 +112,7 @@ class LocalChanges : public PeerChangeListener {
   struct BuiltChunk;
 
   void Submit(Locked& locked, const HullPointer& hull, Change change, Committer::Completion finish);
-  void Advance(Locked& locked, const HullPointer& hull);
+  void Advance(Locked& locked, const HullPointer& hull, bool is_last = false);
 
   void CreateNew(Locked& locked, const std::string& id, const Creation& done);
   absl::Status CheckPutBody(Locked& locked, const std::string& id,

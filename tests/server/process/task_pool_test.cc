@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <functional>
 #include <future>
 #include <memory>
 #include <mutex>
@@ -197,6 +198,32 @@ TEST(TaskPool, DestructionRunsQueuedTasks) {
     pool.reset();
   }
   EXPECT_EQ(ran, 200);
+}
+
+TEST(TaskPool, TasksOfLastActionsRun) {
+  std::promise<int> ended;
+  std::function<void(int)> run;
+  TaskPool pool(2);
+  run = [&](int i) {
+    if (i == 1000) return ended.set_value(i);
+    pool.Submit([&run, i] { run(i + 1); }, kNoClient, true);
+  };
+  pool.Submit([&] { run(0); });
+  EXPECT_EQ(ended.get_future().get(), 1000);
+}
+
+TEST(TaskPool, TasksOfLastActionsFollowQueuedTasks) {
+  HeldPool held;
+  Order order;
+  TaskPool& pool = held.pool();
+  pool.Submit([&] {
+    order.Task("first")();
+    pool.Submit(order.Task("last"), kNoClient, true);
+  });
+  pool.Submit(order.Task("second"));
+  held.Release();
+  held.End();
+  EXPECT_THAT(order.names(), ElementsAre("first", "second", "last"));
 }
 
 TEST(SharedLoop, RunsEachOnce) {
