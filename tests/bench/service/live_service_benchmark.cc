@@ -11,7 +11,10 @@
 // - directly after each acknowledged chunk with an outside point;
 // - then about another hull, which shows the cost of the append to any following call;
 // - while another connection streams such chunks at full rate;
-// - in the same situation about another hull, which shows the cost of the machine's load alone;
+// - in the same situation about another hull, which shows the cost of the server's load alone;
+// - in the same situation about a hull of another server, which shows the cost of the machine's
+// load
+//   alone;
 // - as the first query after a restart.
 //
 // One row of CSV per case: percentiles of the queries, their ratios to the case at rest, and the
@@ -153,19 +156,27 @@ void Measure(const std::string& program, int vertices) {
   Row after_other = {"another hull after an append"};
   Row beside = {"beside a writer"};
   Row other = {"another hull beside a writer"};
+  Row elsewhere = {"another server beside a writer"};
   Row alone = {"writer alone"};
   Row cold = {"first after a restart"};
   {
     const ChildServer server(command);
-    const auto hulls = v1::HullService::NewStub(ConnectAlone(server.address()));
-    MakeBallHull(*hulls, kHull, vertices, 1);
-    MakeBallHull(*hulls, kResting, vertices, 1.1);
-    MakeBallHull(*hulls, kProbe, 64, 0.5);
+    const ChildServer idle({program, "--listen", "127.0.0.1:0", "--store", "memory"});
+    for (const ChildServer* each : {&server, &idle}) {
+      const auto hulls = v1::HullService::NewStub(ConnectAlone(each->address()));
+      MakeBallHull(*hulls, kHull, vertices, 1);
+      MakeBallHull(*hulls, kResting, vertices, 1.1);
+      MakeBallHull(*hulls, kProbe, 64, 0.5);
+    }
     const auto nothing = [] {};
     const auto pause = [] { std::this_thread::sleep_for(std::chrono::milliseconds(500)); };
     const auto stub = v1::CollisionService::NewStub(ConnectAlone(server.address()));
+    const auto idle_stub = v1::CollisionService::NewStub(ConnectAlone(idle.address()));
     // warm up, until all worthwhile preparation is done
-    for (int i = 0; i < 1000; ++i) Ask(*stub, kHull, i);
+    for (int i = 0; i < 1000; ++i) {
+      Ask(*stub, kHull, i);
+      Ask(*idle_stub, kHull, i);
+    }
     for (int round = 0; round < kRounds; ++round) {
       const std::string number = std::to_string(round);
       MeasureTurn(*stub, kHull, nothing, &rest);
@@ -180,6 +191,8 @@ void Measure(const std::string& program, int vertices) {
           writer, [&] { MeasureTurn(*stub, kHull, nothing, &beside); }, &beside);
       Count(
           writer, [&] { MeasureTurn(*stub, kResting, nothing, &other); }, &other);
+      Count(
+          writer, [&] { MeasureTurn(*idle_stub, kHull, nothing, &elsewhere); }, &elsewhere);
       Count(writer, pause, &alone);
     }
   }
@@ -193,7 +206,7 @@ void Measure(const std::string& program, int vertices) {
     Require(v1::HullService::NewStub(channel)->ListHulls(&context, {}, &page), "ListHulls");
     cold.times.push_back(Ask(*v1::CollisionService::NewStub(channel), kHull, 0));
   }
-  for (Row* row : {&rest, &after, &after_other, &beside, &other, &alone, &cold})
+  for (Row* row : {&rest, &after, &after_other, &beside, &other, &elsewhere, &alone, &cold})
     Print(vertices, row, &rest.times);
   std::filesystem::remove_all(directory);
 }
