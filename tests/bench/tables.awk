@@ -468,7 +468,7 @@ function live(   fields, key, order_of, i, n, part) {
   measured()
 }
 
-# Three sizes only; omits queries about another hull.
+# Three sizes only; omits queries about another hull or server.
 function live_service(   fields, reader) {
   head("| vertices | query | p50 | p99 | p50 / at rest | p99 / at rest | chunks of the writer |")
   while (next_row("server_live_" machine, fields)) {
