@@ -64,7 +64,7 @@ int WaitForEnd(const sigset_t& signals, Server& server) {
       return received;
     } else {
       server.RestIdleHulls();
-      GiveBackFreeMemory();
+      ReleaseFreeMemory();
     }
   }
 }

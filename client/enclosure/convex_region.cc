@@ -194,7 +194,7 @@ absl::StatusOr<ConvexRegion> ConvexRegion::Make(const HullMesh& mesh, const Rigi
   return region;
 }
 
-bool ConvexRegion::Holds(const Point& p, const BigVector& P) const {
+bool ConvexRegion::Contains(const Point& p, const BigVector& P) const {
   return !empty_ && std::all_of(half_spaces_.begin(), half_spaces_.end(),
                                 [&](const HalfSpace& half) { return half.Side(p, P) <= 0; });
 }
@@ -217,7 +217,7 @@ absl::StatusOr<bool> IsHullOf(const HullMesh& mesh, const std::vector<double>& x
     const Point p = PointAt(xyz, i);
     // Vertices need no test.
     if (missing.erase(key(p)) > 0) continue;
-    if (!region->Holds(p, OnGrid(p, grid))) return false;
+    if (!region->Contains(p, OnGrid(p, grid))) return false;
   }
   return missing.empty();
 }

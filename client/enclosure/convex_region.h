@@ -54,7 +54,7 @@ class ConvexRegion {
 
   // Returns true if the region contains the point, boundary included; exact. Cost: one test per
   // half space.
-  bool Holds(const std::array<double, 3>& p, const BigVector& P) const;
+  bool Contains(const std::array<double, 3>& p, const BigVector& P) const;
 
  private:
   ConvexRegion() = default;

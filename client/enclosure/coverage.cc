@@ -174,7 +174,8 @@ class Cover {
     for (const Point& p : mesh_.vertices) {
       on_grid_.push_back(OnGrid(p, grid_));
       std::vector<bool>& held = holds_.emplace_back();
-      for (const ConvexRegion& region : regions_) held.push_back(region.Holds(p, on_grid_.back()));
+      for (const ConvexRegion& region : regions_)
+        held.push_back(region.Contains(p, on_grid_.back()));
     }
     return absl::OkStatus();
   }

@@ -158,13 +158,13 @@ absl::Status ParsePlyHeader(ByteSource* source, PlyHeader* header) {
 
 // Returns true if the element names the vertices of faces, or of triangle strips as in files of
 // Stanford University.
-bool HoldsFaces(const Element& element) {
+bool HasFaces(const Element& element) {
   return (element.name == kFaces || element.name == kStrips) &&
          std::any_of(element.properties.begin(), element.properties.end(),
                      [](const Property& property) { return property.is_corners; });
 }
 
-bool HoldsFloats(const Element& vertex) {
+bool HasFloats(const Element& vertex) {
   for (const Property& property : vertex.properties) {
     if (property.axis && property.type != ScalarType::kFloat) return false;
   }
@@ -295,7 +295,7 @@ class BinaryBody {
   template <typename ErrorAt>
   static absl::Status Add(const std::array<double, 3>& xyz, const Element& vertex,
                           const ErrorAt& error_at, PointCollector* points) {
-    if (!HoldsFloats(vertex)) return points->Add(xyz[0], xyz[1], xyz[2], error_at);
+    if (!HasFloats(vertex)) return points->Add(xyz[0], xyz[1], xyz[2], error_at);
     return points->AddFloat(static_cast<float>(xyz[0]), static_cast<float>(xyz[1]),
                             static_cast<float>(xyz[2]), error_at);
   }
@@ -379,7 +379,7 @@ class MeshSink {
 
   Corners* CornersOf(const Element& element) {
     corners_.clear();
-    return HoldsFaces(element) ? &corners_ : nullptr;
+    return HasFaces(element) ? &corners_ : nullptr;
   }
 
   // Adds the face with the corners read: the `i`-th, from 0. In strips, -1 starts a new strip.
@@ -483,7 +483,7 @@ absl::Status ReadPlyMesh(ByteSource* source, TriangleMesh* mesh) {
   bool has_faces = false;
   for (const Element& element : header.elements) {
     if (element.count == 0 || (element.name != kFaces && element.name != kStrips)) continue;
-    if (!HoldsFaces(element)) {
+    if (!HasFaces(element)) {
       return source->ErrorAtLine(
           absl::StrCat("the element ", element.name, " has no list vertex_indices of integers"));
     }

@@ -101,7 +101,7 @@ absl::Status CheckTouching(const v1::Certificate& certificate, const ExactHull& 
   if (GapSign(a, b, n) < 0) {
     return ProofFails("the direction does not separate the interiors: max n.A > min n.B");
   }
-  if (HoldsOriginOnBoundary(differences)) return absl::OkStatus();
+  if (ContainsOriginOnBoundary(differences)) return absl::OkStatus();
   return ProofFails(
       "the vertex pairs show no common point: 0 is not in the hull of their differences");
 }
@@ -110,7 +110,7 @@ absl::Status CheckOverlapping(const v1::Certificate& certificate, const ExactHul
                               const ExactHull& b) {
   HULLD_ASSIGN_OR_RETURN(const auto differences,
                          DifferencesOf(certificate, kMaxOverlappingPairs, a, b));
-  if (HoldsOriginInside(differences)) return absl::OkStatus();
+  if (ContainsOriginInside(differences)) return absl::OkStatus();
   return ProofFails("0 is not inside the hull of the differences of the vertex pairs");
 }
 

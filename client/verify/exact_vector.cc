@@ -51,26 +51,26 @@ bool IsInTriangle(const BigVector& a, const BigVector& b, const BigVector& c) {
 }
 
 // Squared distances of 0 from points of a convex hull, as fractions, compared with r^2.
-class Reach {
+class Ball {
  public:
-  Reach(const BigInteger& r_squared, bool nearer) : r_squared_(r_squared), nearer_(nearer) {}
+  Ball(const BigInteger& r_squared, bool nearer) : r_squared_(r_squared), nearer_(nearer) {}
 
-  bool Holds(const BigInteger& numerator, const BigInteger& denominator) const {
+  bool Contains(const BigInteger& numerator, const BigInteger& denominator) const {
     const BigInteger most = r_squared_ * denominator;
     return nearer_ ? numerator < most : numerator <= most;
   }
   // The point of an edge nearest to 0, if it is inside the edge.
-  bool HoldsEdge(const BigVector& a, const BigVector& b) const {
+  bool MeetsEdge(const BigVector& a, const BigVector& b) const {
     const BigVector e = b - a;
     const BigVector moment = Cross(a, b);
-    return Dot(a, e) < 0 && Dot(b, e) > 0 && Holds(Dot(moment, moment), Dot(e, e));
+    return Dot(a, e) < 0 && Dot(b, e) > 0 && Contains(Dot(moment, moment), Dot(e, e));
   }
   // The point of a triangle nearest to 0, if it is in the triangle; not for one without area.
-  bool HoldsTriangle(const BigVector& a, const BigVector& b, const BigVector& c) const {
+  bool MeetsTriangle(const BigVector& a, const BigVector& b, const BigVector& c) const {
     const BigVector normal = Cross(b - a, c - a);
     const BigInteger height = Dot(normal, a);
     return !IsZero(normal) && Dot(normal, Cross(a, b)) >= 0 && Dot(normal, Cross(b, c)) >= 0 &&
-           Dot(normal, Cross(c, a)) >= 0 && Holds(height * height, Dot(normal, normal));
+           Dot(normal, Cross(c, a)) >= 0 && Contains(height * height, Dot(normal, normal));
   }
 
  private:
@@ -94,7 +94,7 @@ BigInteger CommonExponent::ToInteger(double number) const {
 
 // By Caratheodory 1907: the points with 0 in their hull lie in the plane that bounds the half
 // space, so three of them suffice.
-bool HoldsOriginOnBoundary(std::span<const BigVector> points) {
+bool ContainsOriginOnBoundary(std::span<const BigVector> points) {
   const size_t n = points.size();
   for (size_t i = 0; i < n; ++i) {
     if (IsZero(points[i])) return true;
@@ -111,7 +111,7 @@ bool HoldsOriginOnBoundary(std::span<const BigVector> points) {
 // 0 is inside unless all points lie on one side of, or in, a plane through 0. The normals of such
 // planes form a cone. It is pointed if the points span space, and then has an edge that is
 // perpendicular to two of the points. So the cross products of two points suffice as candidates.
-bool HoldsOriginInside(std::span<const BigVector> points) {
+bool ContainsOriginInside(std::span<const BigVector> points) {
   bool spans_space = false;
   for (size_t i = 0; i < points.size(); ++i) {
     for (size_t j = i + 1; j < points.size(); ++j) {
@@ -133,18 +133,18 @@ bool HoldsOriginInside(std::span<const BigVector> points) {
 
 // The point nearest to 0 is a vertex, or inside an edge or a triangle, or it is 0 itself.
 bool ComesWithin(std::span<const BigVector> points, const BigInteger& r_squared, bool nearer) {
-  const Reach reach(r_squared, nearer);
+  const Ball ball(r_squared, nearer);
   const size_t n = points.size();
   for (size_t i = 0; i < n; ++i) {
-    if (reach.Holds(Dot(points[i], points[i]), 1)) return true;
+    if (ball.Contains(Dot(points[i], points[i]), 1)) return true;
     for (size_t j = i + 1; j < n; ++j) {
-      if (reach.HoldsEdge(points[i], points[j])) return true;
+      if (ball.MeetsEdge(points[i], points[j])) return true;
       for (size_t k = j + 1; k < n; ++k) {
-        if (reach.HoldsTriangle(points[i], points[j], points[k])) return true;
+        if (ball.MeetsTriangle(points[i], points[j], points[k])) return true;
       }
     }
   }
-  return HoldsOriginInside(points);
+  return ContainsOriginInside(points);
 }
 
 }  // namespace hulld

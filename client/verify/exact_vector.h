@@ -50,10 +50,10 @@ class CommonExponent {
 // Returns true if 0 is in the convex hull of the points. Requires that all lie in a closed half
 // space with 0 on its boundary; unchecked, because callers have just found the half space by exact
 // arithmetic. Cost: cubic in the number of points.
-bool HoldsOriginOnBoundary(std::span<const BigVector> points);
+bool ContainsOriginOnBoundary(std::span<const BigVector> points);
 
 // Returns true if 0 is in the interior of the convex hull of the points.
-bool HoldsOriginInside(std::span<const BigVector> points);
+bool ContainsOriginInside(std::span<const BigVector> points);
 
 // Returns true if a point of the convex hull of the points is within r of 0 or, if `nearer`, less
 // than r from it. Cost: cubic in the number of points.

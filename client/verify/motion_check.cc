@@ -395,7 +395,7 @@ absl::Status CheckBriefContact(const MovingPair& pair, const v1::FirstContact& c
         DifferencesOf(certificate, kMaxTouchingPairs, pair.a.HullAt(time), pair.b.HullAt(time)));
     span.insert(span.end(), differences.begin(), differences.end());
   }
-  if (HoldsOriginInside(span) || HoldsOriginOnBoundary(span)) return absl::OkStatus();
+  if (ContainsOriginInside(span) || ContainsOriginOnBoundary(span)) return absl::OkStatus();
   return ProofFails("the vertex pairs show no common point up to contact_time");
 }
 

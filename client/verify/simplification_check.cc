@@ -139,7 +139,7 @@ class AskedHull {
         [&](size_t i) { return IsWithinOfTriangle(exact, CornersOf(triangles_[i]), squared); });
   }
 
-  bool Holds(const Point3& p) const {
+  bool Contains(const Point3& p) const {
     if (HasVertex(p)) return true;
     if (is_flat_) return IsWithin(p, 0);
     const BigVector exact = OnGrid(p);
@@ -256,7 +256,7 @@ absl::Status CheckInside(const HullMesh& hull, const HullMesh& simplified, doubl
 absl::Status CheckOutside(const HullMesh& hull, const HullMesh& simplified, double error,
                           const AskedHull& of_hull, const AskedHull& of_simplified) {
   for (size_t i = 0; i < hull.vertex_count(); ++i) {
-    if (!of_simplified.Holds(PointAt(hull.xyz, i))) {
+    if (!of_simplified.Contains(PointAt(hull.xyz, i))) {
       return NotShown(absl::StrCat("vertex ", i, " of the hull is not in the simplification"));
     }
   }

@@ -61,8 +61,8 @@ bool CentersMaySettle(const FloatPair& pair, const PlainVector& n) {
 // initial direction of the walk, from the normals of the surfaces between the centers; they
 // indicate a gap better than the centers do. Leaves `first` unchanged if these normals are unknown
 // or nearly cancel. Not inlined, to keep the path of distant pairs short.
-[[gnu::noinline]] std::optional<Relation> LookAtCenters(const FloatPair& pair, const PlainVector& n,
-                                                        PlainVector& first) {
+[[gnu::noinline]] std::optional<Relation> CompareCenters(const FloatPair& pair,
+                                                         const PlainVector& n, PlainVector& first) {
   constexpr double kMinSquaredNorm = 0x1p-4;
   if (!CentersMaySettle(pair, n)) return std::nullopt;
   const FloatPair::CenterView view = pair.ViewCenters(n);
@@ -178,7 +178,7 @@ void Remember(const FloatSearchResult& found, PairCache& cache) {
   }
   PlainVector first = n;
   if (purpose == Purpose::kRelation) {
-    if (const std::optional<Relation> relation = LookAtCenters(pair, n, first)) {
+    if (const std::optional<Relation> relation = CompareCenters(pair, n, first)) {
       decision.relation = *relation;
       // The cached suggestion failed, and retrying it would cost more than these bounds.
       if (cache != nullptr) cache->Clear();

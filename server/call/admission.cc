@@ -210,7 +210,7 @@ void Admission::Watch(const Arrival& arrival, Ticket* ticket) {
   if (arrival.call != nullptr) grpc_call_ref(arrival.call);
   ticket->watched_ = watched_.insert(
       watched_.end(), {arrival.caller, arrival.lifetime, arrival.on_revoked, arrival.call, end});
-  if (end < next_look_) watched_changed_.notify_all();
+  if (end < next_check_) watched_changed_.notify_all();
 }
 
 // Searches all watched calls at each check. Checks are rare, because most calls end before they are
@@ -219,13 +219,13 @@ void Admission::CancelOverdue() {
   std::unique_lock lock(mutex_);
   while (!ending_) {
     const auto first = std::ranges::min_element(watched_, {}, &Ticket::Watched::end);
-    next_look_ = first == watched_.end() ? kNever : first->end;
-    if (next_look_ == kNever) {
+    next_check_ = first == watched_.end() ? kNever : first->end;
+    if (next_check_ == kNever) {
       watched_changed_.wait(lock);
       continue;
     }
-    if (std::chrono::steady_clock::now() < next_look_) {
-      watched_changed_.wait_until(lock, next_look_);
+    if (std::chrono::steady_clock::now() < next_check_) {
+      watched_changed_.wait_until(lock, next_check_);
       continue;
     }
     // Prevents a second cancellation.

@@ -201,7 +201,7 @@ class Admission {
   uint64_t last_client_ = 0;
   std::list<Ticket::Watched> watched_;
   // Time of the watchdog's next check, unless notified earlier.
-  std::chrono::steady_clock::time_point next_look_ = kNever;
+  std::chrono::steady_clock::time_point next_check_ = kNever;
   std::condition_variable watched_changed_;
   bool ending_ = false;
   std::thread watchman_;

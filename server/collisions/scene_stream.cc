@@ -110,7 +110,7 @@ class SceneStream
     if (request().has_movers()) options_.movers = request().movers();
     // The box, and at least one pair, of each placement.
     expected_pairs_ = table_.size();
-    return ValidateChoice();
+    return ValidateSelection();
   }
 
   absl::Status Prepare() override {
@@ -214,7 +214,7 @@ class SceneStream
   }
 
   // Called without the mutex.
-  absl::Status ValidateChoice() const {
+  absl::Status ValidateSelection() const {
     const bool has_limit = request().has_limit();
     const bool moves = table_.has_motions();
     const v1::Wanted& wanted = request().wanted();

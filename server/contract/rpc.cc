@@ -37,14 +37,14 @@ constexpr Properties kRpcs[] = {
     {Rpc::kServerReflectionInfo, "ServerReflectionInfo", CallKind::kStream, Permission::kNone},
 };
 
-constexpr bool HoldsEachInOrder() {
+constexpr bool ListsEachInOrder() {
   size_t next = 0;
   for (const Properties& each : kRpcs) {
     if (static_cast<size_t>(each.rpc) != next++) return false;
   }
   return next == kRpcCount;
 }
-static_assert(HoldsEachInOrder());
+static_assert(ListsEachInOrder());
 
 const Properties& PropertiesOf(Rpc rpc) { return kRpcs[static_cast<size_t>(rpc)]; }
 

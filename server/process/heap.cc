@@ -12,7 +12,7 @@ namespace hulld::server {
 namespace {
 
 // Free bytes that malloc may keep: more than ordinary work leaves free. Not tuned.
-constexpr size_t kWorthIt = 64 << 20;
+constexpr size_t kMinReleasedBytes = 64 << 20;
 // Blocks of at least this size are mapped and unmapped individually. Above the size of the lists of
 // a message of a few MiB, which double as they grow. Not tuned.
 constexpr int kMappedBytes = 8 << 20;
@@ -38,9 +38,10 @@ ResidentMemory ReadResidentMemory() {
   return {resident * page, (resident - of_files) * page};
 }
 
-bool GiveBackFreeMemory() {
+bool ReleaseFreeMemory() {
   const struct mallinfo2 heap = mallinfo2();
-  if (ReadResidentMemory().anonymous_bytes < heap.uordblks + heap.hblkhd + kWorthIt) return false;
+  if (ReadResidentMemory().anonymous_bytes < heap.uordblks + heap.hblkhd + kMinReleasedBytes)
+    return false;
   malloc_trim(0);
   return true;
 }

@@ -24,7 +24,7 @@ ResidentMemory ReadResidentMemory();
 // peak of messages: malloc itself returns only memory at the end of an arena. Returns true if it
 // did. Cost: **observed** 0.1 ms, plus 0.7 ms per 10 MiB returned; other threads may block
 // during it.
-bool GiveBackFreeMemory();
+bool ReleaseFreeMemory();
 
 }  // namespace hulld::server
 

@@ -11,7 +11,7 @@ namespace hulld::oracle {
 namespace {
 
 // True if every vertex of the hull of both sets is in `outer`.
-bool Holds(std::span<const Point> outer, std::span<const Point> inner) {
+bool Contains(std::span<const Point> outer, std::span<const Point> inner) {
   std::vector<Point> all(outer.begin(), outer.end());
   all.insert(all.end(), inner.begin(), inner.end());
   const ConvexHull hull = BruteForceHull(all);
@@ -23,7 +23,7 @@ bool Holds(std::span<const Point> outer, std::span<const Point> inner) {
 }  // namespace
 
 bool IsNestedWithin(std::span<const Point> inner, std::span<const Point> outer, double bound) {
-  if (!Holds(outer, inner)) return false;
+  if (!Contains(outer, inner)) return false;
   if (std::isinf(bound)) return true;
   return std::all_of(outer.begin(), outer.end(), [&](const Point& v) {
     // A vertex of the outer hull is never strictly inside the inner one.

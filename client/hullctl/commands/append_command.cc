@@ -5,7 +5,7 @@
 #include "client/hullctl/command_line/point_input.h"
 #include "client/hullctl/commands/commands.h"
 #include "client/hullctl/parts/split_append.h"
-#include "client/hullctl/parts/swell.h"
+#include "client/hullctl/parts/volume_comparison.h"
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/printing/progress_bar.h"
 #include "client/hullctl/printing/table.h"
@@ -142,9 +142,9 @@ void PrintAppendedJson(const Appender& appender, std::ostream& out) {
   out << MessageJson(acknowledged) << "\n";
 }
 
-// swell: see SwellOf; empty if unknown.
+// volumes: see CompareVolumes; empty if unknown.
 void PrintAppended(const Invocation& run, const std::string& hull_id, const FileAppender& files,
-                   const Swell& swell) {
+                   const VolumeComparison& volumes) {
   const Appender& appender = *files.appender();
   const AppendTotals& totals = appender.totals();
   const v1::PointCounts& counts = totals.counts;
@@ -174,7 +174,7 @@ void PrintAppended(const Invocation& run, const std::string& hull_id, const File
   }
   table.Row({"vertices", std::to_string(totals.vertex_count)})
       .Row({"revision", std::to_string(totals.hull_revision)});
-  if (!swell.text.empty()) table.Row({"volume", swell.text});
+  if (!volumes.text.empty()) table.Row({"volume", volumes.text});
   table.Print(run.out);
 }
 
@@ -214,13 +214,13 @@ ExitCode FailAppend(const Invocation& run, const AppendArguments& arguments,
 }
 
 // Returns the volume of the hull relative to the mesh of the files, if known.
-Swell SwellOfFiles(const Invocation& run, const AppendArguments& arguments,
-                   const std::vector<ReadRequest>& plan, uint64_t points) {
+VolumeComparison CompareVolumesOfFiles(const Invocation& run, const AppendArguments& arguments,
+                                       const std::vector<ReadRequest>& plan, uint64_t points) {
   const auto mesh = MeshOf(plan);
   if (!mesh.has_value()) return {};
-  const auto swell = SwellOf(run.MakeClient(), arguments.hull_id, points, *mesh);
+  const auto volumes = CompareVolumes(run.MakeClient(), arguments.hull_id, points, *mesh);
   // The points are appended; failing to read the hull afterwards does not fail the append.
-  return swell.ok() ? *swell : Swell{};
+  return volumes.ok() ? *volumes : VolumeComparison{};
 }
 
 ExitCode SplitAppend(const Invocation& run, const AppendArguments& arguments) {
@@ -253,11 +253,12 @@ ExitCode AppendFiles(const Invocation& run, const AppendArguments& arguments) {
   if (!outcome.stream.ok()) return FailAppend(run, arguments, files, outcome);
   if (outcome.file.ok() || (sent && files.appender()->totals().points_acknowledged > 0)) {
     const bool whole = outcome.file.ok() && files.appender() != nullptr;
-    const Swell swell =
-        whole ? SwellOfFiles(run, arguments, *plan, files.appender()->totals().points_acknowledged)
-              : Swell{};
-    PrintAppended(run, arguments.hull_id, files, swell);
-    WarnOfSwell(run, arguments.hull_id, swell.ratio);
+    const VolumeComparison volumes =
+        whole ? CompareVolumesOfFiles(run, arguments, *plan,
+                                      files.appender()->totals().points_acknowledged)
+              : VolumeComparison{};
+    PrintAppended(run, arguments.hull_id, files, volumes);
+    WarnOfVolumeRatio(run, arguments.hull_id, volumes.ratio);
   }
   return outcome.file.ok() ? ExitCode::kDone : FailAppend(run, arguments, files, outcome);
 }

@@ -32,7 +32,8 @@ std::vector<Candidate> Contexts(const std::string& start) {
 }
 
 // Returns hulls, bodies, or both.
-std::vector<Candidate> Things(Invocation* invocation, ValueKind kind, const std::string& start) {
+std::vector<Candidate> HullsAndBodies(Invocation* invocation, ValueKind kind,
+                                      const std::string& start) {
   if (!ResolveConnection(invocation).ok()) return {};
   ClientOptions options = invocation->MakeClient().options();
   options.timeout = kPatience;
@@ -77,7 +78,7 @@ std::vector<Candidate> Things(Invocation* invocation, ValueKind kind, const std:
 
 ValueSource ValuesFor(Invocation* invocation) {
   return [invocation](ValueKind kind, const std::string& start) {
-    return kind == ValueKind::kContext ? Contexts(start) : Things(invocation, kind, start);
+    return kind == ValueKind::kContext ? Contexts(start) : HullsAndBodies(invocation, kind, start);
   };
 }
 

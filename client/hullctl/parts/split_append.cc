@@ -10,7 +10,7 @@
 
 #include "client/formats/text_number.h"
 #include "client/hullctl/body/hull_segment.h"
-#include "client/hullctl/parts/swell.h"
+#include "client/hullctl/parts/volume_comparison.h"
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/printing/progress_bar.h"
 #include "client/hullctl/printing/table.h"
@@ -161,10 +161,10 @@ ExitCode AppendParts(const Invocation& run, const std::string& body_id,
               << " parts were appended before this error\n";
       return run.Fail(totals.status());
     }
-    const auto swell =
-        SwellOf(client, named.hull_id, named.part.mesh.vertices.size(), named.part.mesh);
-    if (!swell.ok()) return run.Fail(swell.status());
-    WarnOfSwell(run, named.hull_id, swell->ratio);
+    const auto volumes =
+        CompareVolumes(client, named.hull_id, named.part.mesh.vertices.size(), named.part.mesh);
+    if (!volumes.ok()) return run.Fail(volumes.status());
+    WarnOfVolumeRatio(run, named.hull_id, volumes->ratio);
     if (run.names()) {
       run.out << named.hull_id << "\n";
     } else if (run.json()) {
@@ -172,12 +172,12 @@ ExitCode AppendParts(const Invocation& run, const std::string& body_id,
       object.Add("hullId", named.hull_id)
           .Add("triangles", uint64_t{named.part.mesh.triangles.size()})
           .Add("vertices", totals->vertex_count);
-      if (swell->ratio) object.AddJson("volumeRatio", absl::StrCat(*swell->ratio));
+      if (volumes->ratio) object.AddJson("volumeRatio", absl::StrCat(*volumes->ratio));
       run.out << object.Close() << "\n";
     }
     table.Row({named.hull_id, absl::StrCat(named.part.mesh.triangles.size()),
                absl::StrCat(named.part.mesh.vertices.size()), absl::StrCat(totals->vertex_count),
-               swell->text.empty() ? "-" : swell->text});
+               volumes->text.empty() ? "-" : volumes->text});
   }
   if (!run.names() && !run.json()) table.Print(run.out);
   return JoinParts(run, client, *body, body_id, *parts);

@@ -15,7 +15,7 @@
 #include "client/hullctl/body/hull_segment.h"
 #include "client/hullctl/local/file_shape.h"
 #include "client/hullctl/local/local_server.h"
-#include "client/hullctl/parts/swell.h"
+#include "client/hullctl/parts/volume_comparison.h"
 #include "client/hullctl/robot/mesh_pieces.h"
 #include "client/point_messages.h"
 #include "client/robot/package_path.h"
@@ -109,7 +109,7 @@ absl::Status AddLink(const RobotArguments& arguments, const PackagePaths& paths,
 // Warns if the hull of a part is so much larger than its mesh that it is a poor fit.
 void WarnOfSwollenPart(const Invocation& run, const RobotPart& part, const HullMesh& hull) {
   const std::optional<double> ratio = VolumeRatio(hull, part.mesh);
-  if (ratio.value_or(1) < kSwellToWarn) return;
+  if (ratio.value_or(1) < kVolumeRatioToWarn) return;
   run.err << "hullctl: warning: the hull of " << part.name << " has "
           << absl::StrFormat("%.4g", *ratio)
           << " times the volume of its mesh and may collide where the mesh does not; use a convex "

@@ -69,9 +69,9 @@ absl::StatusOr<RobotModel> ReadRobot(const RobotArguments& arguments);
 // Prepares the hulls of all parts for queries. With a prefix, registers them under it and sets
 // their IDs; replaces existing hulls. With --local, does the same without a prefix. Otherwise makes
 // them inline shapes: a private server reduces a mesh to the vertices of its hull. Warns of each
-// hull that is much larger than its mesh (kSwellToWarn). INVALID_ARGUMENT: a hull has more vertices
-// than an inline shape may have. Errors of the servers; without a local server, a mesh of few
-// points is sent as it is.
+// hull that is much larger than its mesh (kVolumeRatioToWarn). INVALID_ARGUMENT: a hull has more
+// vertices than an inline shape may have. Errors of the servers; without a local server, a mesh of
+// few points is sent as it is.
 absl::Status PrepareHulls(const Invocation& run, const RobotArguments& arguments,
                           const Client& client, RobotModel* model);
 

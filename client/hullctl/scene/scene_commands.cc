@@ -44,7 +44,8 @@ constexpr char kYamlHelp[] =
     "Relative file names start at the folder of the scene file.\n";
 
 // If the item was listed, deletes only the listed revision.
-absl::StatusOr<v1::ResponseHeader> DeleteKept(const Client& client, const Kept& kept) {
+absl::StatusOr<v1::ResponseHeader> DeleteServerObject(const Client& client,
+                                                      const ServerObject& kept) {
   if (kept.is_body) {
     const auto deleted = client.DeleteBody(kept.id, kept.revision);
     return deleted.ok() ? deleted->header() : absl::StatusOr<v1::ResponseHeader>(deleted.status());
@@ -55,12 +56,12 @@ absl::StatusOr<v1::ResponseHeader> DeleteKept(const Client& client, const Kept& 
 
 // Returns OK if the user confirms the deletion at the terminal, or if `targets` is empty.
 // INVALID_ARGUMENT: no terminal, or the answer was no; `unless` describes the consequence.
-absl::Status Confirm(const Invocation& run, const std::vector<Kept>& targets,
+absl::Status Confirm(const Invocation& run, const std::vector<ServerObject>& targets,
                      const std::string& unless) {
   if (targets.empty()) return absl::OkStatus();
   std::vector<std::string> ids;
   ids.reserve(targets.size());
-  for (const Kept& kept : targets) ids.push_back(kept.id);
+  for (const ServerObject& kept : targets) ids.push_back(kept.id);
   const bool has_body = targets.front().is_body;
   const bool has_hull = !targets.back().is_body;
   const auto confirmed = ConfirmDeletion(run, ids, has_body ? "body" : "hull",
@@ -86,9 +87,9 @@ class SceneSync {
   SceneSync(const Invocation& run, const SceneDescription& scene)
       : run_(run), scene_(scene), client_(run.MakeClient()) {}
 
-  // Prints the differences, and applies them if `changes`. `prune`: deletes strangers (see
-  // Strangers), after a confirmation unless `yes`. Strangers that appear or change during the run
-  // are kept.
+  // Prints the differences, and applies them if `changes`. `prune`: deletes unlisted objects (see
+  // UnlistedObjects), after a confirmation unless `yes`. Unlisted objects that appear or change
+  // during the run are kept.
   ExitCode Run(bool changes, bool prune, bool yes) {
     std::vector<Change> hulls;
     for (const HullDefinition& hull : scene_.hulls) {
@@ -104,10 +105,10 @@ class SceneSync {
       if (!change.ok()) return run_.Fail(change.status());
       bodies.push_back(*change);
     }
-    const auto strangers = Strangers(client_, scene_);
-    if (!strangers.ok()) return run_.Fail(strangers.status());
+    const auto unlisted = UnlistedObjects(client_, scene_);
+    if (!unlisted.ok()) return run_.Fail(unlisted.status());
     if (prune && changes && !yes) {
-      const absl::Status confirmed = Confirm(run_, *strangers, "cancelled; nothing was changed");
+      const absl::Status confirmed = Confirm(run_, *unlisted, "cancelled; nothing was changed");
       if (!confirmed.ok()) return run_.FailUsage(confirmed);
     }
     for (size_t i = 0; i < hulls.size(); ++i) {
@@ -124,7 +125,7 @@ class SceneSync {
                                       [&] { return client_.PutBody(BodyRequest(body)).status(); });
       if (!taken.ok()) return run_.Fail(taken);
     }
-    const absl::Status listed = TakeStrangers(*strangers, changes, prune);
+    const absl::Status listed = HandleUnlisted(*unlisted, changes, prune);
     if (!listed.ok()) return run_.Fail(listed);
     if (!run_.json() && !run_.names()) {
       run_.out << "# " << Counted(same_hulls_, "hull");
@@ -138,7 +139,7 @@ class SceneSync {
 
  private:
   template <typename Put>
-  absl::Status Take(const Kept& kept, Change change, bool changes, const Put& put) {
+  absl::Status Take(const ServerObject& kept, Change change, bool changes, const Put& put) {
     if (change == Change::kNone) {
       ++(kept.is_body ? same_bodies_ : same_hulls_);
       return absl::OkStatus();
@@ -153,13 +154,13 @@ class SceneSync {
     return absl::OkStatus();
   }
 
-  absl::Status TakeStrangers(const std::vector<Kept>& strangers, bool changes, bool prune) {
-    for (const Kept& stranger : strangers) {
+  absl::Status HandleUnlisted(const std::vector<ServerObject>& unlisted, bool changes, bool prune) {
+    for (const ServerObject& object : unlisted) {
       if (prune && changes) {
-        const absl::Status deleted = DeleteKept(client_, stranger).status();
+        const absl::Status deleted = DeleteServerObject(client_, object).status();
         if (!deleted.ok() && !absl::IsNotFound(deleted)) return deleted;
       }
-      PrintChange(prune ? "-" : "?", stranger,
+      PrintChange(prune ? "-" : "?", object,
                   !prune    ? "not in the file"
                   : changes ? "deleted"
                             : "to delete");
@@ -167,7 +168,7 @@ class SceneSync {
     return absl::OkStatus();
   }
 
-  void PrintChange(const char* mark, const Kept& kept, const char* what) {
+  void PrintChange(const char* mark, const ServerObject& kept, const char* what) {
     ++differences_;
     if (run_.json()) {
       run_.out << JsonObject()
@@ -213,9 +214,9 @@ ExitCode DiffScene(const Invocation& run, const SyncArguments& arguments) {
 }
 
 // Returns the scene's definitions that exist on the server, bodies before their hulls.
-absl::StatusOr<std::vector<Kept>> DefinedAndThere(const Client& client,
-                                                  const SceneDescription& scene) {
-  std::vector<Kept> kept;
+absl::StatusOr<std::vector<ServerObject>> DefinedAndThere(const Client& client,
+                                                          const SceneDescription& scene) {
+  std::vector<ServerObject> kept;
   const auto take = [&kept](const std::string& id, bool is_body, const absl::Status& found) {
     // Damaged hulls and bodies can be deleted.
     if (found.ok() || absl::IsDataLoss(found)) kept.push_back({id, is_body, std::nullopt});
@@ -246,8 +247,8 @@ ExitCode DeleteScene(const Invocation& run, const SyncArguments& arguments) {
     const absl::Status confirmed = Confirm(run, *targets, "nothing was deleted");
     if (!confirmed.ok()) return run.FailUsage(confirmed);
   }
-  for (const Kept& kept : *targets) {
-    const auto header = DeleteKept(client, kept);
+  for (const ServerObject& kept : *targets) {
+    const auto header = DeleteServerObject(client, kept);
     if (absl::IsNotFound(header.status())) continue;
     if (!header.ok()) return run.Fail(header.status());
     if (run.json()) {

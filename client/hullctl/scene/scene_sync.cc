@@ -86,13 +86,14 @@ absl::Status PutAll(const Client& client, const SceneDescription& scene) {
 
 bool OwnsItsPrefix(const SceneDescription& scene) { return scene.prefix.ends_with('/'); }
 
-absl::StatusOr<std::vector<Kept>> Strangers(const Client& client, const SceneDescription& scene) {
-  std::vector<Kept> strangers;
-  if (!OwnsItsPrefix(scene)) return strangers;
-  const auto add = [&strangers](const std::string& id, bool is_body, const auto& info) {
+absl::StatusOr<std::vector<ServerObject>> UnlistedObjects(const Client& client,
+                                                          const SceneDescription& scene) {
+  std::vector<ServerObject> unlisted;
+  if (!OwnsItsPrefix(scene)) return unlisted;
+  const auto add = [&unlisted](const std::string& id, bool is_body, const auto& info) {
     std::optional<uint64_t> revision;
     if (!info.damaged()) revision = info.revision();
-    strangers.push_back({id, is_body, revision});
+    unlisted.push_back({id, is_body, revision});
   };
   std::set<std::string> defined_bodies;
   for (const BodyDefinition& body : scene.bodies) defined_bodies.insert(body.body_id);
@@ -106,7 +107,7 @@ absl::StatusOr<std::vector<Kept>> Strangers(const Client& client, const SceneDes
   for (const v1::HullInfo& hull : list.hulls()) {
     if (!defined.contains(hull.hull_id())) add(hull.hull_id(), false, hull);
   }
-  return strangers;
+  return unlisted;
 }
 
 }  // namespace hulld

@@ -38,7 +38,7 @@ absl::Status PutHull(const Client& client, const std::string& hull_id,
 absl::Status PutAll(const Client& client, const SceneDescription& scene);
 
 // A hull or a body of the server.
-struct Kept {
+struct ServerObject {
   std::string id;
   bool is_body = false;
   // Revision in the list; absent if it is damaged, or was not listed.
@@ -50,9 +50,10 @@ struct Kept {
 // "cell-30/arm".
 bool OwnsItsPrefix(const SceneDescription& scene);
 
-// Returns the strangers: hulls and bodies under the scene's prefix that the scene does not define,
-// bodies first. Empty if the scene does not own its prefix.
-absl::StatusOr<std::vector<Kept>> Strangers(const Client& client, const SceneDescription& scene);
+// Returns the unlisted objects: hulls and bodies under the scene's prefix that the scene does not
+// define, bodies first. Empty if the scene does not own its prefix.
+absl::StatusOr<std::vector<ServerObject>> UnlistedObjects(const Client& client,
+                                                          const SceneDescription& scene);
 
 }  // namespace hulld
 

@@ -140,7 +140,7 @@ std::optional<SimplifiedHull> Enclosure::HullAround(std::span<const Corner> corn
   }
   HullBuilder builder;
   if (!builder.Add(points, {.should_stop = should_stop_}).ok()) return std::nullopt;
-  if (!HoldsAll(builder)) return std::nullopt;
+  if (!ContainsAll(builder)) return std::nullopt;
   absl::StatusOr<Hull> hull = builder.Snapshot(should_stop_);
   if (!hull.ok()) return std::nullopt;
   // The distance from a convex set is largest at a vertex, and every vertex is a corner.
@@ -154,7 +154,7 @@ std::optional<SimplifiedHull> Enclosure::HullAround(std::span<const Corner> corn
 }
 
 // Exact: a point outside the hull would become a vertex.
-bool Enclosure::HoldsAll(HullBuilder hull) {
+bool Enclosure::ContainsAll(HullBuilder hull) {
   const std::span<const Vector> all = full_.vertices();
   const auto holds = [&](std::span<const Vector> points) {
     const absl::StatusOr<PointCounts> counts = hull.Add(points);

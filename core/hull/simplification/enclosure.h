@@ -48,7 +48,7 @@ class Enclosure {
     return {scale_.FromUnit(unit_point), near};
   }
   std::optional<SimplifiedHull> HullAround(std::span<const Corner> corners);
-  bool HoldsAll(HullBuilder hull);
+  bool ContainsAll(HullBuilder hull);
 
   const Hull& full_;
   const std::span<const Vector> unit_points_;

@@ -16,7 +16,7 @@ namespace {
 
 // Steps between two polls of should_stop. A step takes at most a microsecond, except for exact
 // pairs, which poll themselves.
-constexpr int kStepsPerLook = 16;
+constexpr int kStepsPerPoll = 16;
 
 // Rank of a relation among the relations of pairs.
 int Strength(Relation relation) {
@@ -126,7 +126,7 @@ BodySearch::BodySearch(const PlacedBody& a, const PlacedBody& b, const QueryOpti
       each_(OptionsOfEachPair(options)),
       wants_least_(each_.want_separation),
       gap_(*x_, *y_),
-      poll_(options.should_stop, kStepsPerLook) {
+      poll_(options.should_stop, kStepsPerPoll) {
   HULLD_DCHECK(ValidateBodyOptions(options).ok());
   UpdateLimit();
   if (!x_->body().tree().empty() && !y_->body().tree().empty()) Push(0, 0);

@@ -50,7 +50,7 @@ bool IsOnLattice(const FloatPair& pair) {
 
 // Returns true if the triangle contains the origin. False for collinear corners. Requires: the
 // origin in the triangle's plane.
-bool HoldsOrigin(const Vector& p, const Vector& q, const Vector& r, CoordinatePlane plane) {
+bool ContainsOrigin(const Vector& p, const Vector& q, const Vector& r, CoordinatePlane plane) {
   const Vector origin = Vector::Zero();
   const auto [least, most] =
       std::minmax({Orient2d(p, q, origin, plane), Orient2d(q, r, origin, plane),
@@ -127,7 +127,7 @@ std::optional<LatticeContact> FindLatticeContact(const FloatPair& pair,
       const uint32_t p = in_plane[skipped == 0 ? 1 : 0];
       const uint32_t q = in_plane[skipped <= 1 ? 2 : 1];
       const uint32_t r = in_plane[skipped <= 2 ? 3 : 2];
-      if (HoldsOrigin(w[p], w[q], w[r], plane)) {
+      if (ContainsOrigin(w[p], w[q], w[r], plane)) {
         return LatticeContact{n, {end.pairs[p], end.pairs[q], end.pairs[r]}};
       }
     }

@@ -22,8 +22,8 @@ constexpr uint64_t kMaxDirections = 64;
 // Returns true if the origin is certainly strictly inside a tetrahedron of computed Minkowski
 // vertices.
 template <typename Pair>
-bool HoldsOrigin(const Pair& pair, const PlainVector& p, const PlainVector& q, const PlainVector& r,
-                 const PlainVector& s) {
+bool ContainsOrigin(const Pair& pair, const PlainVector& p, const PlainVector& q,
+                    const PlainVector& r, const PlainVector& s) {
   const double largest = std::max(std::max(LargestComponent(p), LargestComponent(q)),
                                   std::max(LargestComponent(r), LargestComponent(s)));
   const double position_error = kMinkowskiErrorFactor * pair.size();
@@ -129,8 +129,8 @@ class FloatSearch {
       return progress;
     }
     if (!outside) {
-      if (HoldsOrigin(pair_, simplex_.corner(0), simplex_.corner(1), simplex_.corner(2),
-                      simplex_.corner(3))) {
+      if (ContainsOrigin(pair_, simplex_.corner(0), simplex_.corner(1), simplex_.corner(2),
+                         simplex_.corner(3))) {
         verdict_ = FloatVerdict::kOverlapping;
         return false;
       }
@@ -257,7 +257,7 @@ FloatSearchResult TryCached(const FloatPair& pair, const PairCache& cache) {
                    known.b < pair.b().query_hull().point_count());
     }
     const auto difference = [&](int i) { return pair.Difference(cache.pairs[i]); };
-    if (HoldsOrigin(pair, difference(0), difference(1), difference(2), difference(3))) {
+    if (ContainsOrigin(pair, difference(0), difference(1), difference(2), difference(3))) {
       result.verdict = FloatVerdict::kOverlapping;
       result.pair_count = 4;
       std::copy(cache.pairs, cache.pairs + 4, result.pairs.begin());

@@ -107,10 +107,10 @@ Vector PerWidth(const SupportMap& support) {
 }
 
 // Casts rays from a point o inside a hull, using only the hull's support points.
-class Lookout {
+class RayCaster {
  public:
-  Lookout(std::span<const Vector> points, const Vector& o, const SupportMap& support,
-          const Vector& per_width)
+  RayCaster(std::span<const Vector> points, const Vector& o, const SupportMap& support,
+            const Vector& per_width)
       : points_(points),
         o_(o),
         support_(support),
@@ -309,7 +309,7 @@ CenterBounds::CenterBounds(std::span<const Vector> points, int dimension, const 
   map_->radius = radius;
   map_->max_abs = max_abs;
   map_->support = &support;
-  if (making == Making::kAtFirstLook) {
+  if (making == Making::kAtFirstUse) {
     for (std::atomic<uint64_t>& cells : map_->awaited)
       cells.store(~uint64_t{0}, std::memory_order_relaxed);
   }
@@ -332,12 +332,12 @@ void CenterBounds::MakeCell(uint32_t face, uint32_t i, uint32_t j) const {
 void CenterBounds::Begin() const {
   map_->corners.resize(corner_count(), {kUnknown, kUnknown});
   map_->per_width = PerWidth(*map_->support);
-  Lookout lookout(map_->points, map_->center, *map_->support, map_->per_width);
-  if (!lookout.IsInside()) return;
+  RayCaster caster(map_->points, map_->center, *map_->support, map_->per_width);
+  if (!caster.IsInside()) return;
   double least = kInfinity;
   for (uint32_t octant = 0; octant < 8; ++octant) {
     const auto sign = [octant](uint32_t axis) { return (octant >> axis & 1) == 0 ? 1.0 : -1.0; };
-    least = std::min(least, lookout.Reach(Vector(sign(0), sign(1), sign(2))));
+    least = std::min(least, caster.Reach(Vector(sign(0), sign(1), sign(2))));
     // The center is strictly inside only if it is surrounded, up to rounding.
     if (!(least > 0 && least >= kCenterMinRadius * map_->max_abs)) return;
   }
@@ -369,8 +369,8 @@ float CenterBounds::MakeGauge(uint32_t corner) const {
   }
   const auto& [d, twin] = Corners(side_)[corner];
   if (!std::isnan(corners[twin].gauge)) return gauge = corners[twin].gauge;
-  Lookout lookout(map_->points, map_->center, *map_->support, map_->per_width);
-  const double t = lookout.Reach(d);
+  RayCaster caster(map_->points, map_->center, *map_->support, map_->per_width);
+  const double t = caster.Reach(d);
   // Infinite if no point was found.
   gauge = RoundedUp(std::min((1 + kCenterMargin) / t, map_->largest_gauge) * unit_);
   return corners[twin].gauge = gauge;

@@ -37,10 +37,10 @@ namespace hulld {
 // Thread-safe.
 class CenterBounds {
  public:
-  // Time at which a cell is computed. kAtFirstLook: answers do not depend on earlier queries.
-  // kAtSecondLook: a hull with few queries costs less, because a cell costs as much as several
+  // Time at which a cell is computed. kAtFirstUse: answers do not depend on earlier queries.
+  // kAtSecondUse: a hull with few queries costs less, because a cell costs as much as several
   // queries; the bounds of the cell are unknown until then.
-  enum class Making { kAtFirstLook, kAtSecondLook };
+  enum class Making { kAtFirstUse, kAtSecondUse };
 
   // Has no bounds: every bound is unknown.
   CenterBounds() = default;
@@ -53,7 +53,7 @@ class CenterBounds {
                const SupportMap& support, Making making);
   CenterBounds(const Hull& hull, const SupportMap& support)
       : CenterBounds(hull.vertices(), hull.dimension(), hull.center(), hull.max_abs_coordinate(),
-                     support, Making::kAtFirstLook) {}
+                     support, Making::kAtFirstUse) {}
 
   // NaN if unknown.
   struct Bounds {

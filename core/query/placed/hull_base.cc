@@ -41,7 +41,7 @@ HullBase::HullBase(MappedPoints mapped, int dimension)
   Measure();
   Span(dimension);
   center_bounds_ = CenterBounds(points_, dimension, center_, max_abs_, support_,
-                                CenterBounds::Making::kAtSecondLook);
+                                CenterBounds::Making::kAtSecondUse);
 }
 
 HullBase::HullBase(std::vector<Vector> points, int dimension)

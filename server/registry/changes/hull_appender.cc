@@ -67,7 +67,7 @@ absl::Status CheckChunkRevision(const AppendSession& session, const HullRecord& 
 
 // Adds the points missing from a builder. Returns false if the result differs from the record; the
 // builder must then be rebuilt.
-bool BringUp(HullBuilder& builder, std::span<const Vector> backlog, const HullRecord& record) {
+bool CatchUp(HullBuilder& builder, std::span<const Vector> backlog, const HullRecord& record) {
   if (backlog.empty()) return true;
   return builder.Add(backlog).ok() && builder.vertex_count() == record.vertex_count &&
          builder.dimension() == record.dimension;
@@ -371,7 +371,7 @@ absl::StatusOr<PointCounts> LocalChanges::AddPoints(PendingChunk& pending, LentB
                                                     LiveHull& live, BuiltChunk& built) {
   Change& change = built.change;
   std::unique_ptr<HullBuilder>& builder = lent.builder;
-  if (builder != nullptr && !BringUp(*builder, lent.backlog, change.hull.record)) {
+  if (builder != nullptr && !CatchUp(*builder, lent.backlog, change.hull.record)) {
     builder = nullptr;
   }
   if (builder == nullptr) {

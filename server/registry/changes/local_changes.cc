@@ -34,7 +34,7 @@ Change MakeChange(const RegisteredHull* former, Replacement& replacement) {
 }
 
 // Moves the data back into the replacement for a retry.
-void TakeBack(RegisteredHull& hull, Change& change, Replacement& replacement) {
+void RestoreReplacement(RegisteredHull& hull, Change& change, Replacement& replacement) {
   *replacement.builder = std::move(*hull.LendBuilder().builder);
   replacement.live = hull.live();
   if (change.vertex_change == VertexChange::kReplaced) {
@@ -178,7 +178,7 @@ void LocalChanges::CommitReplacement(Locked& locked, const HullPointer& former,
   Submit(locked, former == nullptr ? hull : former, std::move(change),
          [=, this](Locked& later, const absl::Status& status, Change& replaced) {
            const bool is_superseded = Committer::IsSuperseded(status);
-           if (is_superseded) TakeBack(*hull, replaced, *replacement);
+           if (is_superseded) RestoreReplacement(*hull, replaced, *replacement);
            if (former == nullptr) state_.EndCreatingHull(later, hull, status);
            if (is_superseded) return later.AfterwardsLocked(again);
            if (!status.ok()) return Answer(later, done, status);

@@ -28,7 +28,7 @@ constexpr size_t kMaxPerStep = 16;
 // Minimum number of steps of a large load: small steps let all threads finish together.
 constexpr size_t kMinSteps = 8;
 // Loading this many small hulls takes longer than waking a thread.
-constexpr size_t kWorthAThread = 8;
+constexpr size_t kMinHullsPerThread = 8;
 
 // points: the hull's points as read from the store.
 absl::StatusOr<std::shared_ptr<LiveHull>> MakeLive(const StoredHull& stored,
@@ -69,8 +69,9 @@ std::vector<LoadedHull> LoadEach(Store& store, std::span<const StoredHull> hulls
       loaded[i] = MakeLive(hulls[i], std::move(points[i - begin]));
     }
   };
-  SharedLoop::Run(helpers, std::min(helpers.threads(), hulls.size() / kWorthAThread), hulls.size(),
-                  std::clamp<size_t>(hulls.size() / kMinSteps, 1, kMaxPerStep), load, should_stop);
+  SharedLoop::Run(helpers, std::min(helpers.threads(), hulls.size() / kMinHullsPerThread),
+                  hulls.size(), std::clamp<size_t>(hulls.size() / kMinSteps, 1, kMaxPerStep), load,
+                  should_stop);
   return loaded;
 }
 

@@ -16,7 +16,7 @@ namespace {
 
 // Key of the active server's advisory lock within its database: "hulld" as a number.
 constexpr uint64_t kLock = 0x68756c6c64;
-constexpr int kBeatsPerMeasure = 10;
+constexpr int kHeartbeatsPerMeasure = 10;
 
 }  // namespace
 
@@ -54,33 +54,35 @@ absl::Status PostgresStore::Superseded(std::string_view owner) {
 
 void PostgresStore::Keep() {
   bool failing = false;
-  int deaf_beats = 0;
-  bool said_deaf = false;
+  int silent_heartbeats = 0;
+  bool reported_silence = false;
   std::unique_lock lock(mutex_);
-  const auto period = options_.shared ? std::min(options_.look, options_.beat) : options_.beat;
-  const int64_t looks_per_beat = options_.beat / period;
-  for (int64_t look = 1; !wake_.wait_for(lock, period, [this] { return ending_; }); ++look) {
-    const bool is_beat = look % looks_per_beat == 0;
-    // Retries an unreachable database only once per beat.
-    if (keeper_session_ == nullptr && !is_beat) continue;
+  const auto period =
+      options_.shared ? std::min(options_.poll_interval, options_.heartbeat) : options_.heartbeat;
+  const int64_t polls_per_heartbeat = options_.heartbeat / period;
+  for (int64_t poll = 1; !wake_.wait_for(lock, period, [this] { return ending_; }); ++poll) {
+    const bool is_heartbeat = poll % polls_per_heartbeat == 0;
+    // Retries an unreachable database only once per heartbeat.
+    if (keeper_session_ == nullptr && !is_heartbeat) continue;
     lock.unlock();
-    if (is_beat) {
-      const bool is_deaf = notices_ != nullptr && notices_->is_listening() && !HearsPeers();
-      deaf_beats = is_deaf ? deaf_beats + 1 : 0;
-      said_deaf = said_deaf && is_deaf;
+    if (is_heartbeat) {
+      const bool is_silent = notices_ != nullptr && notices_->is_listening() && !HearsPeers();
+      silent_heartbeats = is_silent ? silent_heartbeats + 1 : 0;
+      reported_silence = reported_silence && is_silent;
     }
-    // Two beats without the expected notice are not a coincidence.
-    if (deaf_beats == 2 && !std::exchange(said_deaf, true)) {
+    // Two heartbeats without the expected notice are not a coincidence.
+    if (silent_heartbeats == 2 && !std::exchange(reported_silence, true)) {
       spdlog::warn(
           "no commit notices are arriving although the listening session is open; polling the "
           "database every {} ms until one arrives",
-          options_.look.count());
+          options_.poll_interval.count());
     }
     absl::Status status;
-    if (is_beat) status = Beat();
-    if (status.ok() && is_beat && options_.shared) status = EndStuckTurns();
-    if (status.ok() && options_.shared && (is_beat || !HearsPeers())) status = PollPeers();
-    if (status.ok() && look % (looks_per_beat * kBeatsPerMeasure) == 0) status = MeasureDisk();
+    if (is_heartbeat) status = Beat();
+    if (status.ok() && is_heartbeat && options_.shared) status = EndStuckTransactions();
+    if (status.ok() && options_.shared && (is_heartbeat || !HearsPeers())) status = PollPeers();
+    if (status.ok() && poll % (polls_per_heartbeat * kHeartbeatsPerMeasure) == 0)
+      status = MeasureDisk();
     if (!status.ok()) {
       keeper_session_ = nullptr;
       has_lock_ = false;

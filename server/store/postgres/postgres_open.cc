@@ -20,8 +20,8 @@ namespace {
 constexpr int kMaxReaders = 8;
 constexpr int kMinServerVersion = 140'000;
 // Pauses between attempts to become the active server.
-constexpr std::chrono::milliseconds kFirstTurnPause{10};
-constexpr std::chrono::milliseconds kLongestTurnPause{250};
+constexpr std::chrono::milliseconds kMinLockPause{10};
+constexpr std::chrono::milliseconds kMaxLockPause{250};
 
 // hulld.store has one row. `revision` and `batch`, the number of batches, belong to the last
 // committed batch. `epoch` and `owner` belong to the active server; a batch writes its own epoch
@@ -239,7 +239,7 @@ absl::Status PostgresStore::BeginPatiently() {
   const auto deadline = std::chrono::steady_clock::now() + options_.patience;
   // Begin must not run twice: the store would appear not to have been closed.
   bool has_begun = false;
-  for (auto pause = kFirstTurnPause;; pause = std::min(2 * pause, kLongestTurnPause)) {
+  for (auto pause = kMinLockPause;; pause = std::min(2 * pause, kMaxLockPause)) {
     absl::Status status;
     if (!has_begun) status = options_.shared ? Join() : Begin();
     has_begun = status.ok() || has_begun;
@@ -284,9 +284,9 @@ absl::StatusOr<std::unique_ptr<Session>> PostgresStore::OpenReader() const {
                                   kPrepareReads, options_.shared ? PrepareFetch() : ""));
 }
 
-// The database ends this session, and with it this server's claim, after several missed beats.
+// The database ends this session, and with it this server's claim, after several missed heartbeats.
 absl::StatusOr<std::unique_ptr<Session>> PostgresStore::OpenKeeper() const {
-  const auto patience = 10 * options_.beat;
+  const auto patience = 10 * options_.heartbeat;
   return OpenSession(absl::StrCat("SET statement_timeout = ", options_.answer_time.count(),
                                   "; SET idle_session_timeout = ", patience.count()));
 }
@@ -375,7 +375,7 @@ absl::StatusOr<Rows> PostgresStore::Claim(Statement claim) {
 absl::Status PostgresStore::WaitForTurn() {
   if (options_.take_over) return absl::OkStatus();
   // Retries quickly at first: a server that was just killed may still hold the lock.
-  for (auto pause = kFirstTurnPause;; pause = std::min(2 * pause, kLongestTurnPause)) {
+  for (auto pause = kMinLockPause;; pause = std::min(2 * pause, kMaxLockPause)) {
     absl::StatusOr<bool> locked = absl::UnavailableError("");
     if (keeper_session_ != nullptr) locked = TryLock(*keeper_session_);
     has_lock_ = locked.ok() && *locked;
@@ -384,7 +384,7 @@ absl::Status PostgresStore::WaitForTurn() {
       // Also waits while a database restarts or fails over.
       absl::StatusOr<std::unique_ptr<Session>> session = OpenKeeper();
       keeper_session_ = session.ok() ? *std::move(session) : nullptr;
-    } else if (pause < kLongestTurnPause && 2 * pause >= kLongestTurnPause) {
+    } else if (pause < kMaxLockPause && 2 * pause >= kMaxLockPause) {
       const absl::StatusOr<std::string> owner = Owner(*keeper_session_);
       spdlog::info("another hulld is active on this database ({}); waiting until it exits{}",
                    owner.ok() && !owner->empty() ? *owner : "starting",

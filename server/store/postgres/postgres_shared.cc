@@ -297,7 +297,7 @@ absl::StatusOr<bool> PostgresStore::SharedOutcome(uint64_t batch) {
 // Ends sessions that hold the turn without sending anything, such as the session of a server that
 // stalls while sending a batch: PostgreSQL has timeouts between transactions and between batches of
 // statements, but not within a batch.
-absl::Status PostgresStore::EndStuckTurns() {
+absl::Status PostgresStore::EndStuckTransactions() {
   return keeper_session_
       ->Run(absl::StrCat(
           "SELECT pg_terminate_backend(a.pid) FROM pg_locks l JOIN pg_stat_activity a USING (pid) "
@@ -313,13 +313,13 @@ void PostgresStore::StartNotices() {
     if (batch > seen_batch_) NotifyPeerCommit();
   };
   notices_ = std::make_unique<BatchNotices>(
-      [this] { return OpenListener(); }, options_.beat, on_batch,
-      absl::StrCat("the server polls it every ", options_.look.count(), " ms"));
+      [this] { return OpenListener(); }, options_.heartbeat, on_batch,
+      absl::StrCat("the server polls it every ", options_.poll_interval.count(), " ms"));
 }
 
-// True if notices arrive. The keeper still polls the store with each beat. A batch found by polling
-// but not announced by then means that a notice was lost; the keeper then polls more often until a
-// notice arrives.
+// True if notices arrive. The keeper still polls the store with each heartbeat. A batch found by
+// polling but not announced by then means that a notice was lost; the keeper then polls more often
+// until a notice arrives.
 bool PostgresStore::HearsPeers() const {
   return notices_ != nullptr && notices_->is_listening() && notices_->last_heard() >= looked_at_;
 }

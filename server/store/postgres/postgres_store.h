@@ -54,12 +54,12 @@ struct PostgresOptions {
   std::chrono::milliseconds patience{10'000};
   // Interval at which this server checks that it is still active. The database considers the server
   // dead ten intervals after its last check.
-  std::chrono::milliseconds beat{1000};
+  std::chrono::milliseconds heartbeat{1000};
   // Shared: true if servers notify each other of their batches (BatchNotices).
   bool notices = true;
   // Shared: interval of polling for commits of peer servers without notices; with notices, it is
-  // one beat.
-  std::chrono::milliseconds look{100};
+  // one heartbeat.
+  std::chrono::milliseconds poll_interval{100};
   // Shared: maximum time that a session may hold the turn while the database waits for the rest of
   // its batch, for example because its server stalls. The session is then ended.
   std::chrono::milliseconds longest_send{30'000};
@@ -219,7 +219,7 @@ class PostgresStore : public Store, public PeerFeed {
   absl::Status NotePeerChanges(const Rows& rows);
   absl::Status AttemptShared(std::span<Change* const> changes, Batch* batch);
   absl::StatusOr<bool> SharedOutcome(uint64_t batch);
-  absl::Status EndStuckTurns();
+  absl::Status EndStuckTransactions();
   void StartNotices();
   bool HearsPeers() const;
   absl::Status PollPeers();

@@ -127,13 +127,13 @@ bool CollisionWatchCheck::IsWatched(const Pair& pair) const {
 }
 
 std::string CollisionWatchCheck::Received(const v1::WatchCollisionsResponse& response) {
-  if (response.update() < told_update_ || response.update() > sent_) {
-    return absl::StrCat("update ", response.update(), " is reported after ", told_update_,
+  if (response.update() < reported_update_ || response.update() > sent_) {
+    return absl::StrCat("update ", response.update(), " is reported after ", reported_update_,
                         "; updates sent: ", sent_);
   }
   if (response.header().revision() < revision_) return "the revision of a watch decreases";
   revision_ = response.header().revision();
-  told_update_ = response.update();
+  reported_update_ = response.update();
   for (const auto* const hulls : {&response.hulls(), &response.piece_hulls()}) {
     for (const v1::HullVersion& hull : *hulls) {
       if (hull.revision() == 0) return "a hull has no revision";

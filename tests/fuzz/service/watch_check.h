@@ -54,7 +54,7 @@ class CollisionWatchCheck {
   std::string Received(const v1::WatchCollisionsResponse& response);
 
   // True if everything sent has been answered.
-  bool is_settled() const { return is_synced_ && told_update_ == sent_; }
+  bool is_settled() const { return is_synced_ && reported_update_ == sent_; }
   // Returns the reported pairs that touch or overlap, lower index first.
   std::map<std::pair<uint32_t, uint32_t>, v1::Relation> Colliding() const;
   // Returns a batch of all watched pairs in their current state.
@@ -84,7 +84,7 @@ class CollisionWatchCheck {
   // Since the last `synced`.
   std::set<Pair> told_now_;
   uint64_t sent_ = 0;
-  uint64_t told_update_ = 0;
+  uint64_t reported_update_ = 0;
   uint64_t revision_ = 0;
   bool is_synced_ = false;
 };

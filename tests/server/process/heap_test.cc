@@ -16,7 +16,7 @@ TEST(Heap, DISABLED_OnlyLargeAmountsOfFreeMemoryAreReturned) {
 #else
 TEST(Heap, OnlyLargeAmountsOfFreeMemoryAreReturned) {
 #endif
-  GiveBackFreeMemory();
+  ReleaseFreeMemory();
   constexpr size_t kBlock = 8 << 10;
   constexpr size_t kBlocks = 20'000;
   std::vector<std::unique_ptr<char[]>> blocks(kBlocks);
@@ -24,11 +24,11 @@ TEST(Heap, OnlyLargeAmountsOfFreeMemoryAreReturned) {
     block = std::make_unique<char[]>(kBlock);
     std::memset(block.get(), 1, kBlock);
   }
-  EXPECT_FALSE(GiveBackFreeMemory());
+  EXPECT_FALSE(ReleaseFreeMemory());
   // The last block keeps all earlier ones from being returned automatically.
   for (size_t i = 0; i + 1 < kBlocks; ++i) blocks[i] = nullptr;
-  EXPECT_TRUE(GiveBackFreeMemory());
-  EXPECT_FALSE(GiveBackFreeMemory());
+  EXPECT_TRUE(ReleaseFreeMemory());
+  EXPECT_FALSE(ReleaseFreeMemory());
 }
 
 }  // namespace heap_test

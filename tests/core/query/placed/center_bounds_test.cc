@@ -60,7 +60,7 @@ double SupportOf(const Hull& hull, const Vector& n) {
   return farthest;
 }
 
-bool Holds(const Hull& hull, const Vector& p) {
+bool Contains(const Hull& hull, const Vector& p) {
   const auto v = hull.vertices();
   for (size_t f = 0; f < hull.facet_count(); ++f) {
     const auto facet = hull.facet(f);
@@ -96,7 +96,7 @@ TEST(CenterBounds, PointsWithinTheGaugeAreInside) {
       }
       ASSERT_GT(gauge, 0) << name;
       ASSERT_LE(gauge, (1 + 1e-6) * bounds.largest_gauge() * d.cwiseAbs().maxCoeff()) << name;
-      ASSERT_TRUE(Holds(hull, hull.center() + d / gauge)) << name << " seed " << seed;
+      ASSERT_TRUE(Contains(hull, hull.center() + d / gauge)) << name << " seed " << seed;
     }
   }
   EXPECT_GT(without, 0);
@@ -159,7 +159,7 @@ TEST(CenterBounds, CellsComputedAtTheSecondUseAreTheSame) {
     const CenterBounds at_first(hull, support);
     const CenterBounds at_second(hull.vertices(), hull.dimension(), hull.center(),
                                  hull.max_abs_coordinate(), support,
-                                 CenterBounds::Making::kAtSecondLook);
+                                 CenterBounds::Making::kAtSecondUse);
     int unknown = 0;
     for (const Vector& n : Directions(random)) {
       const CenterBounds::Bounds expected = at_first.Along(n);

@@ -241,7 +241,7 @@ class OrderSearch {
 
   // Returns true if a read follows all changes that it must contain, and a change follows all
   // changes of the same store with lower revisions.
-  bool HoldsAll(size_t i) const {
+  bool ContainsAll(size_t i) const {
     const Placed& operation = operations_[i];
     const bool is_read = IsRead(operation);
     const uint64_t revision = is_read
@@ -277,7 +277,7 @@ class OrderSearch {
   // state unchanged, and makes no unanswered call too late.
   bool NeedsNoBranching(size_t i, const Node& node) const {
     const Placed& read = operations_[i];
-    if (!IsRead(read) || !HoldsAll(i)) return false;
+    if (!IsRead(read) || !ContainsAll(i)) return false;
     for (size_t j = first_left_; j < operations_.size() && operations_[j].invoked <= read.invoked;
          ++j) {
       if (!done_[j] && !IsTooLate(j, node.latest) && IsTooLate(j, read.invoked)) return false;
@@ -337,7 +337,7 @@ class OrderSearch {
     }
     const size_t i = last.candidates[last.next++];
     State next = last.state;
-    if (!HoldsAll(i) || !StepAll(next, operations_[i])) return false;
+    if (!ContainsAll(i) || !StepAll(next, operations_[i])) return false;
     done_[i] = true;
     last_done_ = std::max(last.last_before, i);
     last.taken = i;

@@ -139,9 +139,9 @@ void CuttingProxy::CutListeners() {
   }
 }
 
-void CuttingProxy::SetDeaf(bool deaf) {
+void CuttingProxy::WithholdNotices(bool withhold) {
   const std::lock_guard lock(mutex_);
-  deaf_ = deaf;
+  withholds_notices_ = withhold;
 }
 
 void CuttingProxy::SetDelay(std::chrono::milliseconds delay) {
@@ -243,7 +243,7 @@ void CuttingProxy::NoteQuery(Connection& connection, std::string& message) {
 bool CuttingProxy::NoteAnswer(const Connection& connection, size_t bytes) {
   const std::lock_guard lock(mutex_);
   answered_bytes_ += bytes;
-  return deaf_ && connection.listens;
+  return withholds_notices_ && connection.listens;
 }
 
 // Returns false to cut the connection.

@@ -45,10 +45,10 @@ class CuttingProxy {
   void GoDownWithCut();
   // Cuts so far.
   int cuts();
-  // CutListeners cuts the current connections that issued LISTEN. SetDeaf withholds everything the
-  // server sends to them, like a network that silently lost a connection.
+  // CutListeners cuts the current connections that issued LISTEN. WithholdNotices withholds
+  // everything the server sends to them, like a network that silently lost a connection.
   void CutListeners();
-  void SetDeaf(bool deaf);
+  void WithholdNotices(bool withhold);
   // Delays every piece of the server's answers.
   void SetDelay(std::chrono::milliseconds delay);
   // Replaces LISTEN by a statement that the server rejects, from now on.
@@ -86,7 +86,7 @@ class CuttingProxy {
   Cut next_ = Cut::kNone;
   bool down_ = false;
   bool down_with_cut_ = false;
-  bool deaf_ = false;
+  bool withholds_notices_ = false;
   std::chrono::milliseconds delay_{0};
   bool refuses_to_listen_ = false;
   int cuts_ = 0;

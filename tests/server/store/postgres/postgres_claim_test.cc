@@ -23,7 +23,7 @@ constexpr char kHasLock[] =
 
 TEST_F(PostgresClaim, ASupersededServerCommitsNothing) {
   // The server sends no heartbeat during this test: the database refuses it.
-  options_.beat = std::chrono::hours(1);
+  options_.heartbeat = std::chrono::hours(1);
   Start();
   const AppendSession session = hulls_->Open("h")->session;
   ASSERT_TRUE(hulls_->Append(session, 1, CubeCorners()).ok());
@@ -48,7 +48,7 @@ TEST_F(PostgresClaim, ASupersededServerCommitsNothing) {
 
 // The stored state may be newer than the server's; that is not damage.
 TEST_F(PostgresClaim, ASupersededServerReadsNothing) {
-  options_.beat = std::chrono::hours(1);
+  options_.heartbeat = std::chrono::hours(1);
   Start();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
   Start();
@@ -64,7 +64,7 @@ TEST_F(PostgresClaim, ASupersededServerReadsNothing) {
 }
 
 TEST_F(PostgresClaim, AnIdleServerNoticesThatItWasSuperseded) {
-  options_.beat = std::chrono::milliseconds(10);
+  options_.heartbeat = std::chrono::milliseconds(10);
   Start();
   std::promise<void> ended;
   hulls_->store().OnEnded([&] { ended.set_value(); });
@@ -102,7 +102,7 @@ TEST_F(PostgresClaim, AWaitingServerCanBeStopped) {
 // The active server's machine is cut off or the server hangs: the database ends its session, which
 // held the lock.
 TEST_F(PostgresClaim, AWaitingServerTakesOverWhenTheActiveOneLosesItsLock) {
-  options_.beat = std::chrono::hours(1);
+  options_.heartbeat = std::chrono::hours(1);
   Start();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
   auto next = std::async(std::launch::async, [this] { return Open(); });
@@ -114,7 +114,7 @@ TEST_F(PostgresClaim, AWaitingServerTakesOverWhenTheActiveOneLosesItsLock) {
 }
 
 TEST_F(PostgresClaim, AServerReclaimsALostLock) {
-  options_.beat = std::chrono::milliseconds(10);
+  options_.heartbeat = std::chrono::milliseconds(10);
   Start();
   const uint64_t epoch = hulls_->store().epoch();
   EndSessions(kHasLock);

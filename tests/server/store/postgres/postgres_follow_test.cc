@@ -17,7 +17,7 @@ using ::testing::HasSubstr;
 using Server = std::unique_ptr<PostgresRegistry>;
 
 constexpr std::chrono::hours kNever{1};
-constexpr char kLook[] = "SELECT batch FROM hulld.store";
+constexpr char kPoll[] = "SELECT batch FROM hulld.store";
 // Waits that take this long have failed.
 constexpr std::chrono::seconds kLong{60};
 
@@ -31,7 +31,7 @@ class PostgresFollow : public PostgresTest {
   // A server reads changes of its peers only when it is called.
   void FollowWhenCalled() {
     options_.notices = false;
-    options_.look = options_.beat = kNever;
+    options_.poll_interval = options_.heartbeat = kNever;
   }
   // Starts a server that bypasses the proxy.
   Server StartPeer() {
@@ -298,7 +298,7 @@ class Watcher {
 };
 
 // Returns true when the condition becomes true; false after kLong.
-bool Comes(const std::function<bool()>& what) {
+bool BecomesTrue(const std::function<bool()>& what) {
   const auto end = std::chrono::steady_clock::now() + kLong;
   while (!what()) {
     if (std::chrono::steady_clock::now() > end) return false;
@@ -309,7 +309,7 @@ bool Comes(const std::function<bool()>& what) {
 
 // No server polls.
 TEST_F(PostgresFollow, ANoticeOfABatchTriggersAReadImmediately) {
-  options_.look = options_.beat = kNever;
+  options_.poll_interval = options_.heartbeat = kNever;
   Start();
   const Server other = StartPeer();
   Watcher here(hulls_->registry());
@@ -320,12 +320,12 @@ TEST_F(PostgresFollow, ANoticeOfABatchTriggersAReadImmediately) {
     ASSERT_TRUE(here.Reports(id)) << i;
     ASSERT_TRUE(there.Reports(id)) << i;
   }
-  EXPECT_EQ(proxy_->Asked(kLook), 1);
+  EXPECT_EQ(proxy_->Asked(kPoll), 1);
 }
 
 TEST_F(PostgresFollow, WithoutNoticesServersPoll) {
   options_.notices = false;
-  options_.look = std::chrono::milliseconds(10);
+  options_.poll_interval = std::chrono::milliseconds(10);
   Start();
   const Server other = StartPeer();
   Watcher watcher(hulls_->registry());
@@ -336,7 +336,7 @@ TEST_F(PostgresFollow, WithoutNoticesServersPoll) {
 // The listening session reconnects by itself.
 TEST_F(PostgresFollow, ALostListeningSessionIsReopened) {
   const CapturedLog log;
-  options_.look = options_.beat = std::chrono::milliseconds(20);
+  options_.poll_interval = options_.heartbeat = std::chrono::milliseconds(20);
   Start();
   other_ = StartPeer();
   {
@@ -348,7 +348,7 @@ TEST_F(PostgresFollow, ALostListeningSessionIsReopened) {
       const std::string id = absl::StrCat("h", i);
       ASSERT_TRUE(other_->Create(id).ok());
       EXPECT_TRUE(watcher.Reports(id));
-      ASSERT_TRUE(Comes([&] { return proxy_->Asked("LISTEN hulld_batches") > listened; }));
+      ASSERT_TRUE(BecomesTrue([&] { return proxy_->Asked("LISTEN hulld_batches") > listened; }));
     }
   }
   EndAll();
@@ -361,29 +361,30 @@ TEST_F(PostgresFollow, ALostListeningSessionIsReopened) {
 // server polls more often until notices arrive again.
 TEST_F(PostgresFollow, AServerWithoutNoticesPollsMoreOften) {
   const CapturedLog log;
-  options_.look = std::chrono::milliseconds(5);
-  options_.beat = std::chrono::milliseconds(500);
+  options_.poll_interval = std::chrono::milliseconds(5);
+  options_.heartbeat = std::chrono::milliseconds(500);
   Start();
   other_ = StartPeer();
   auto watcher = std::make_unique<Watcher>(hulls_->registry());
-  const auto looks = [&] { return proxy_->Asked(kLook); };
-  const auto beats = [&] { return proxy_->Asked("SELECT owner FROM hulld.store"); };
+  const auto polls = [&] { return proxy_->Asked(kPoll); };
+  const auto heartbeats = [&] { return proxy_->Asked("SELECT owner FROM hulld.store"); };
   ASSERT_TRUE(other_->Create("heard").ok());
   ASSERT_TRUE(watcher->Reports("heard"));
-  proxy_->SetDeaf(true);
+  proxy_->WithholdNotices(true);
   ASSERT_TRUE(other_->Create("unheard").ok());
   EXPECT_TRUE(watcher->Reports("unheard"));
-  const int beats_then = beats();
-  EXPECT_TRUE(Comes([&] { return beats() > beats_then + 3; }));
-  EXPECT_GT(looks(), 3 * beats());
-  proxy_->SetDeaf(false);
+  const int heartbeats_then = heartbeats();
+  EXPECT_TRUE(BecomesTrue([&] { return heartbeats() > heartbeats_then + 3; }));
+  EXPECT_GT(polls(), 3 * heartbeats());
+  proxy_->WithholdNotices(false);
   ASSERT_TRUE(other_->Create("heard again").ok());
   EXPECT_TRUE(watcher->Reports("heard again"));
   // Two heartbeats cause two polls, and one poll may already have been running.
-  EXPECT_TRUE(Comes([&] {
-    const int looks_before = looks();
-    const int beats_before = beats();
-    return Comes([&] { return beats() >= beats_before + 2; }) && looks() - looks_before <= 3;
+  EXPECT_TRUE(BecomesTrue([&] {
+    const int polls_before = polls();
+    const int heartbeats_before = heartbeats();
+    return BecomesTrue([&] { return heartbeats() >= heartbeats_before + 2; }) &&
+           polls() - polls_before <= 3;
   }));
   watcher = nullptr;
   EndAll();
@@ -393,7 +394,7 @@ TEST_F(PostgresFollow, AServerWithoutNoticesPollsMoreOften) {
 // The database speaks PostgreSQL's protocol but lacks LISTEN. The log reports this only once.
 TEST_F(PostgresFollow, ServersPollIfTheDatabaseRefusesToListen) {
   const CapturedLog log;
-  options_.look = options_.beat = std::chrono::milliseconds(10);
+  options_.poll_interval = options_.heartbeat = std::chrono::milliseconds(10);
   proxy_->RefuseToListen();
   Start();
   other_ = StartPeer();

@@ -38,7 +38,7 @@ class PostgresShared : public PostgresTest {
     options_ = through_proxy;
     return server;
   }
-  void LookOnlyWhenAsked() { options_.look = options_.beat = std::chrono::hours(1); }
+  void PollOnlyWhenAsked() { options_.poll_interval = options_.heartbeat = std::chrono::hours(1); }
   static uint64_t Received(PostgresRegistry& server, const std::string& id) {
     const auto view = server.View(id);
     return view.ok() ? view->record.counts.received : 0;
@@ -109,7 +109,7 @@ class PostgresShared : public PostgresTest {
 
 // Holds regardless of how rarely the server polls.
 TEST_F(PostgresShared, APeerServerServesAcknowledgedChanges) {
-  LookOnlyWhenAsked();
+  PollOnlyWhenAsked();
   Start();
   const Server other = StartPeer();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
@@ -343,7 +343,7 @@ TEST_F(PostgresShared, AnEvictedHullOfAnOpenStreamIsReadAgain) {
 // Both changes of an ID form one event. A watch of hulls alone reports the hull.
 TEST_F(PostgresShared, WatchesReportIdsThatBecameABodyOrAHull) {
   options_.notices = false;
-  options_.look = options_.beat = std::chrono::hours(1);
+  options_.poll_interval = options_.heartbeat = std::chrono::hours(1);
   Start();
   const Server other = StartPeer();
   ASSERT_TRUE(other->Create("was-hull").ok());
@@ -496,7 +496,7 @@ TEST_F(PostgresShared, ACreationOrDeletionWithALostAnswerIsNotRepeated) {
 
 // Data of one record is not returned to a caller with an older record.
 TEST_F(PostgresShared, ReadsWithAnOldRecordAreAborted) {
-  LookOnlyWhenAsked();
+  PollOnlyWhenAsked();
   Start();
   const Server other = StartPeer();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
@@ -517,7 +517,7 @@ TEST_F(PostgresShared, ReadsWithAnOldRecordAreAborted) {
 
 // The server's knowledge of the hull is stale, so deciding from it would be wrong in each case.
 TEST_F(PostgresShared, ChangesAreDecidedByPeerChanges) {
-  LookOnlyWhenAsked();
+  PollOnlyWhenAsked();
   Start();
   const Server other = StartPeer();
   ASSERT_TRUE(hulls_->Create("h").ok());
@@ -656,7 +656,7 @@ TEST_F(PostgresShared, ARestoredDatabaseIsADifferentStoreForAllServers) {
 // Half of a batch has arrived, and nothing follows.
 TEST_F(PostgresShared, AServerStalledWithinABatchBlocksPeersOnlyBriefly) {
   options_.longest_send = std::chrono::milliseconds(100);
-  options_.beat = std::chrono::milliseconds(50);
+  options_.heartbeat = std::chrono::milliseconds(50);
   Start();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
   const std::string conninfo = cluster().Conninfo(database_, cluster().socket_directory());
@@ -682,7 +682,7 @@ TEST_F(PostgresShared, AServerTooFarBehindStops) {
   Start();
   const Server other = StartPeer();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
-  options_.look = std::chrono::hours(1);
+  options_.poll_interval = std::chrono::hours(1);
   bool ended = false;
   hulls_->store().OnEnded([&] { ended = true; });
   Ask("UPDATE hulld.store SET batch = batch + 1, pruned = batch + 1");

@@ -1,4 +1,4 @@
-#include "client/hullctl/parts/swell.h"
+#include "client/hullctl/parts/volume_comparison.h"
 
 #include <absl/strings/str_format.h>
 #include <sys/stat.h>
@@ -14,13 +14,14 @@ constexpr off_t kMaxSwellBytes = off_t{64} << 20;
 
 }  // namespace
 
-std::string SwellText(std::optional<double> ratio) {
+std::string VolumeRatioText(std::optional<double> ratio) {
   if (!ratio.has_value()) return "not compared: the mesh is not closed";
   return absl::StrFormat("%.4g times that of the mesh", *ratio);
 }
 
-void WarnOfSwell(const Invocation& run, const std::string& hull_id, std::optional<double> ratio) {
-  if (!ratio.has_value() || *ratio < kSwellToWarn) return;
+void WarnOfVolumeRatio(const Invocation& run, const std::string& hull_id,
+                       std::optional<double> ratio) {
+  if (!ratio.has_value() || *ratio < kVolumeRatioToWarn) return;
   run.err << "hullctl: warning: the hull " << hull_id << " has " << absl::StrFormat("%.4g", *ratio)
           << " times the volume of its mesh; split the mesh into parts with --split or a convex "
              "decomposition\n";
@@ -50,15 +51,15 @@ std::optional<TriangleMesh> MeshOf(const std::vector<ReadRequest>& files) {
   return all;
 }
 
-absl::StatusOr<Swell> SwellOf(const Client& client, const std::string& hull_id, uint64_t points,
-                              const TriangleMesh& mesh) {
+absl::StatusOr<VolumeComparison> CompareVolumes(const Client& client, const std::string& hull_id,
+                                                uint64_t points, const TriangleMesh& mesh) {
   const auto hull = client.GetHullMesh(hull_id);
   if (!hull.ok()) return hull.status();
-  Swell swell;
-  if (hull->header.hull().counts().received() != points) return swell;
-  swell.ratio = VolumeRatio(*hull, mesh);
-  swell.text = SwellText(swell.ratio);
-  return swell;
+  VolumeComparison volumes;
+  if (hull->header.hull().counts().received() != points) return volumes;
+  volumes.ratio = VolumeRatio(*hull, mesh);
+  volumes.text = VolumeRatioText(volumes.ratio);
+  return volumes;
 }
 
 }  // namespace hulld
