@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
+#include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -13,6 +15,9 @@
 
 namespace hulld {
 namespace {
+
+// Number of elements between the prefetch of data that is scattered in memory and its use.
+constexpr size_t kAhead = 16;
 
 // A vertex being sorted into canonical order.
 struct Ranked {
@@ -95,10 +100,14 @@ Ranking Rank(const VertexTable& vertices, StopPoll& poll) {
   Ranking ranking;
   ranking.points.reserve(ranked.size());
   ranking.index_of.resize(vertices.id_bound());
-  for (const Ranked& v : ranked) {
+  for (size_t i = 0; i < ranked.size(); ++i) {
     if (poll.Step()) return {};
-    ranking.index_of[v.id] = static_cast<uint32_t>(ranking.points.size());
-    ranking.points.push_back(vertices[v.id]);
+    if (const size_t ahead = i + kAhead; ahead < ranked.size()) {
+      __builtin_prefetch(&vertices[ranked[ahead].id]);
+      __builtin_prefetch(&ranking.index_of[ranked[ahead].id], 1);
+    }
+    ranking.index_of[ranked[i].id] = static_cast<uint32_t>(i);
+    ranking.points.push_back(vertices[ranked[i].id]);
   }
   return ranking;
 }
@@ -124,13 +133,14 @@ class FaceCollector {
         surface_(surface),
         ranking_(ranking),
         flags_(surface.id_bound(), 0),
+        ranks_(std::make_unique_for_overwrite<Ranks[]>(surface.id_bound())),
         departures_at_(ranking.points.size() + 1, 0) {
     polygon_starts_.push_back(0);
   }
 
   // Returns false if stopped.
   bool Run(StopPoll& poll) {
-    FindFlatEdges(poll);
+    ReadTriangles(poll);
     if (poll.stopped()) return false;
     TracePolygons(poll);
     if (poll.stopped()) return false;
@@ -146,7 +156,7 @@ class FaceCollector {
     // Reserves exactly, because a snapshot is long-lived and never grows.
     faces.facet_starts.reserve(triangle_facets_ + polygon_starts_.size());
     faces.facet_vertices.reserve(3 * triangle_facets_ + polygon_vertices_.size());
-    faces.edges.reserve(departures_.size() - 1);
+    faces.edges.reserve(departure_count_);
     faces.facet_starts.push_back(0);
     const auto vertex_count = static_cast<uint32_t>(ranking_.points.size());
     uint32_t first = 0;
@@ -154,7 +164,7 @@ class FaceCollector {
       if (poll.Step()) return std::nullopt;
       // After WriteDepartures, this is the end of the departures.
       const uint32_t end = departures_at_[tail];
-      SortByHead(std::span(departures_).subspan(first, end - first));
+      SortByHead({departures_.get() + first, end - first});
       for (; first < end; ++first) {
         const Departure& d = departures_[first];
         faces.edges.push_back({tail, d.head});
@@ -177,8 +187,6 @@ class FaceCollector {
   // has been found.
   static constexpr uint8_t kAnyFlat = 7;
   static constexpr uint8_t kVisited = 8;
-  // Triangles between the request of a neighbor and its use.
-  static constexpr size_t kAhead = 16;
 
   // An edge from its lower vertex to its higher one.
   struct Departure {
@@ -189,40 +197,57 @@ class FaceCollector {
     uint32_t next;
   };
 
-  std::array<uint32_t, 3> RanksOf(const SurfaceTriangle& t) const {
-    return {ranking_.index_of[t.corners[0]], ranking_.index_of[t.corners[1]],
-            ranking_.index_of[t.corners[2]]};
-  }
+  using Ranks = std::array<uint32_t, 3>;
   std::span<const uint32_t> Polygon(size_t k) const {
     return std::span(polygon_vertices_)
         .subspan(polygon_starts_[k], polygon_starts_[k + 1] - polygon_starts_[k]);
   }
 
-  // Edges at which a triangle was joined to an older one already record if they are flat. Triangles
-  // created together share an apex; for each of these, tests the edge to the next triangle around
-  // the apex.
-  void FindFlatEdges(StopPoll& poll) {
+  // Finds the flat edges and the ranks of corners, and counts the departures of each triangle as if
+  // it were a facet: in one pass, because a large surface exceeds the caches. Edges at which a
+  // triangle was joined to an older one already record if they are flat. Triangles created together
+  // share an apex; for each of these, tests the edge to the next triangle around the apex.
+  void ReadTriangles(StopPoll& poll) {
     const auto neighbor = [this](size_t id) -> const SurfaceTriangle& {
       return surface_.triangle(surface_.triangle(static_cast<TriangleId>(id)).neighbors[1]);
     };
-    surface_.ForEachTriangle([&](TriangleId id, const SurfaceTriangle& t) {
+    const auto none = static_cast<uint32_t>(ranking_.points.size());
+    const size_t end = surface_.id_bound();
+    for (TriangleId id = 0; id < end; ++id) {
       if (poll.Step()) return;
-      // Neighbors and their vertices are scattered in memory, so both are prefetched. Not a
+      // Neighbors, vertices, and their ranks are scattered in memory, so all are prefetched. Not a
       // function, because compilers drop calls without effect.
-      if (const size_t ahead = id + kAhead; ahead < surface_.id_bound()) {
+      if (const size_t ahead = id + kAhead; ahead < end) {
         __builtin_prefetch(&neighbor(ahead));
         __builtin_prefetch(&vertices_[neighbor(ahead - kAhead / 2).corners[1]]);
+        if (surface_.IsAlive(static_cast<TriangleId>(ahead))) {
+          for (const VertexId v : surface_.triangle(static_cast<TriangleId>(ahead)).corners) {
+            __builtin_prefetch(&ranking_.index_of[v]);
+          }
+        }
       }
+      if (id >= kAhead / 2) AddToDepartures(ranks_[id - kAhead / 2], 1);
+      ranks_[id] = {none, none, none};
+      if (!surface_.IsAlive(id)) continue;
+      const SurfaceTriangle& t = surface_.triangle(id);
       flags_[id] |= t.flat;
+      ++triangle_facets_;
+      for (size_t i = 0; i < 3; ++i) {
+        ranks_[id][i] = ranking_.index_of[t.corners[i]];
+        __builtin_prefetch(&departures_at_[ranks_[id][i]]);
+      }
       const TriangleId next = t.neighbors[1];
       const SurfaceTriangle& other = surface_.triangle(next);
-      if (other.corners[2] != t.corners[2]) return;
+      if (other.corners[2] != t.corners[2]) continue;
       HULLD_CHECK(other.neighbors[2] == id);
       if (surface_.IsInPlane(vertices_, id, vertices_[other.corners[1]])) {
         flags_[id] |= 1 << 1;
         flags_[next] |= 1 << 2;
       }
-    });
+    }
+    for (size_t id = end - std::min(end, kAhead / 2); id < end; ++id) {
+      AddToDepartures(ranks_[id], 1);
+    }
   }
 
   void TracePolygons(StopPoll& poll) {
@@ -247,7 +272,7 @@ class FaceCollector {
     size_t steps_left = 3 * surface_.triangle_count();
     do {
       if (poll.Step()) return;
-      polygon_vertices_.push_back(ranking_.index_of[surface_.triangle(id).corners[edge]]);
+      polygon_vertices_.push_back(ranks_[id][edge]);
       flags_[id] |= kVisited;
       edge = (edge + 1) % 3;
       while (IsFlat(id, edge)) {
@@ -270,8 +295,8 @@ class FaceCollector {
   // a lower vertex to a higher one. The other edges of a triangle are visited with the number of
   // vertices as their tail, because a branch would be unpredictable.
   template <typename Visitor>
-  void ForEachTriangleDeparture(const SurfaceTriangle& t, Visitor&& visit) const {
-    const auto [a, b, c] = RanksOf(t);
+  void ForEachTriangleDeparture(const Ranks& ranks, Visitor&& visit) const {
+    const auto [a, b, c] = ranks;
     const auto none = static_cast<uint32_t>(ranking_.points.size());
     visit(a < b ? a : none, b, c);
     visit(b < c ? b : none, c, a);
@@ -286,20 +311,31 @@ class FaceCollector {
     }
   }
 
-  // Sets departures_at_[v] to the start of the departures at vertex v.
-  void CountDepartures(StopPoll& poll) {
-    const auto count = [this](uint32_t tail, uint32_t, uint32_t) { ++departures_at_[tail]; };
-    surface_.ForEachTriangle([&](TriangleId id, const SurfaceTriangle& t) {
-      if (poll.Step() || (flags_[id] & kAnyFlat) != 0) return;
-      ++triangle_facets_;
-      ForEachTriangleDeparture(t, count);
+  // Adds `change`, which is 1 or -1, to the count of departures at each tail of a triangle.
+  void AddToDepartures(const Ranks& ranks, int change) {
+    ForEachTriangleDeparture(ranks, [&](uint32_t tail, uint32_t, uint32_t) {
+      departures_at_[tail] += static_cast<uint32_t>(change);
     });
-    for (size_t k = 0; k + 1 < polygon_starts_.size(); ++k) ForEachPolygonDeparture(k, count);
-    uint32_t begin = 0;
+  }
+
+  // Corrects the counts for facets of several triangles, and sets departures_at_[v] to the start of
+  // the departures at vertex v.
+  void CountDepartures(StopPoll& poll) {
+    for (TriangleId id = 0; id < flags_.size(); ++id) {
+      if ((flags_[id] & kAnyFlat) == 0) continue;
+      if (poll.Step()) return;
+      AddToDepartures(ranks_[id], -1);
+      ranks_[id].fill(static_cast<uint32_t>(ranking_.points.size()));
+      --triangle_facets_;
+    }
+    for (size_t k = 0; k + 1 < polygon_starts_.size(); ++k) {
+      ForEachPolygonDeparture(
+          k, [this](uint32_t tail, uint32_t, uint32_t) { ++departures_at_[tail]; });
+    }
     // The last entry counts the edges that are not departures, which share one place.
     departures_at_.back() = 0;
-    for (uint32_t& at : departures_at_) begin += std::exchange(at, begin);
-    departures_.resize(begin + 1);
+    for (uint32_t& at : departures_at_) departure_count_ += std::exchange(at, departure_count_);
+    departures_ = std::make_unique_for_overwrite<Departure[]>(departure_count_ + 1);
   }
 
   // Advances departures_at_[v] to the end of the departures at vertex v.
@@ -309,11 +345,16 @@ class FaceCollector {
       departures_[departures_at_[tail]] = {head, next};
       departures_at_[tail] += tail != none;
     };
-    surface_.ForEachTriangle([&](TriangleId id, const SurfaceTriangle& t) {
-      if (poll.Step() || (flags_[id] & kAnyFlat) != 0) return;
-      ForEachTriangleDeparture(t, write);
-    });
-    if (poll.stopped()) return;
+    for (size_t id = 0; id < flags_.size(); ++id) {
+      if (poll.Step()) return;
+      if (const size_t ahead = id + kAhead; ahead < flags_.size()) {
+        for (const uint32_t v : ranks_[ahead]) __builtin_prefetch(&departures_at_[v]);
+        for (const uint32_t v : ranks_[ahead - kAhead / 2]) {
+          __builtin_prefetch(&departures_[departures_at_[v]]);
+        }
+      }
+      ForEachTriangleDeparture(ranks_[id], write);
+    }
     for (size_t k = 0; k + 1 < polygon_starts_.size(); ++k) ForEachPolygonDeparture(k, write);
   }
 
@@ -337,12 +378,16 @@ class FaceCollector {
   const Ranking& ranking_;
   // By triangle.
   std::vector<uint8_t> flags_;
+  // By triangle: the ranks of its corners. The number of vertices instead if the triangle is free,
+  // and, once its facet is known, if it is only a part of it.
+  std::unique_ptr<Ranks[]> ranks_;
   size_t triangle_facets_ = 0;
   // The facets that are not triangles of the surface, by ranks, each from its lowest vertex.
   std::vector<uint32_t> polygon_starts_;
   std::vector<uint32_t> polygon_vertices_;
   // Departures in order of their lower vertices, and the start or end of each vertex's range.
-  std::vector<Departure> departures_;
+  std::unique_ptr<Departure[]> departures_;
+  uint32_t departure_count_ = 0;
   std::vector<uint32_t> departures_at_;
 };
 
