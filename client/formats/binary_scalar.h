@@ -65,8 +65,7 @@ inline bool IsDouble(ScalarType type, const unsigned char* bytes, bool big_endia
 }
 
 // Returns the value stored in SizeOf(type) bytes. Exact, except for 64-bit integers beyond 2^53,
-// which are rounded to nearest
-// (see IsDouble).
+// which are rounded to nearest (see IsDouble).
 inline double LoadScalar(ScalarType type, const unsigned char* bytes, bool big_endian) {
   unsigned char little[kMaxScalarBytes];
   const size_t size = SizeOf(type);

@@ -75,13 +75,15 @@ std::string Hint(const std::string& word, const std::vector<std::string>& known,
 
 // Parses a size such as "512MiB" into bytes.
 std::optional<uint64_t> ParseSize(std::string text) {
+  uint64_t bytes = 0;
+  bool is_size = false;
   try {
-    uint64_t bytes = 0;
     CLI::AsSizeValue(/*kb_is_1000=*/true)(text);
-    return absl::SimpleAtoi(text, &bytes) ? std::optional(bytes) : std::nullopt;
+    is_size = absl::SimpleAtoi(text, &bytes);
   } catch (const CLI::ValidationError&) {
-    return std::nullopt;
+    is_size = false;
   }
+  return is_size ? std::optional(bytes) : std::nullopt;
 }
 
 // Wraps descriptions, so that lines have at most 100 columns.
