@@ -2,10 +2,8 @@
 #define HULLD_TESTS_FUZZ_FILES_FILE_CHECK_H_
 
 #include <cstddef>
-#include <functional>
 #include <string>
 #include <string_view>
-#include <vector>
 
 namespace hulld::fuzz {
 
@@ -51,20 +49,6 @@ struct FileVerdict {
 // range and counts equal to the number of items delivered. It does not depend on the block size or,
 // if all points are finite, on skipping non-finite ones. Accepted JSON round-trips.
 FileVerdict CheckFile(FileKind kind, std::string_view content);
-
-// A small file of each kind, with variants if the kind has several.
-struct SeedFile {
-  FileKind kind;
-  std::string content;
-};
-std::vector<SeedFile> SeedFiles();
-
-// Mutates `content` once: swaps, repeats, or drops a line, number, binary word, or tag, replaces a
-// number or word by an extreme value, or truncates the file. next(n) chooses a number below n.
-void ChangeStructure(const std::function<size_t(size_t)>& next, std::string* content);
-
-// Words and numbers of these formats, valid and invalid.
-const std::vector<std::string>& FileTokens();
 
 }  // namespace hulld::fuzz
 

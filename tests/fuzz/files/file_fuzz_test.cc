@@ -8,6 +8,8 @@
 
 #include "tests/core/checks/point_sets.h"
 #include "tests/fuzz/files/file_check.h"
+#include "tests/fuzz/files/file_mutation.h"
+#include "tests/fuzz/files/file_seeds.h"
 
 namespace hulld::fuzz {
 namespace file_fuzz_test {

@@ -17,6 +17,8 @@
 #include <string_view>
 
 #include "tests/fuzz/files/file_check.h"
+#include "tests/fuzz/files/file_mutation.h"
+#include "tests/fuzz/files/file_seeds.h"
 
 namespace {
 
