@@ -107,8 +107,8 @@ check_includes() {
       { echo "{} lacks an include"; exit 255; }' _ "$headers"
 }
 
-# Tests leave a third of the processor idle, so a second check runs concurrently. in_background NAME COMMAND... starts a command;
-# finish NAME waits for it, prints its output, and returns its exit code.
+# Tests leave a third of the processor idle, so a second check runs concurrently. in_background
+# NAME COMMAND... starts a command; finish NAME waits for it, prints its output, and returns its exit code.
 declare -A background
 in_background() {
   "${@:2}" >"build/$1.log" 2>&1 &

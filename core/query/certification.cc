@@ -60,8 +60,7 @@ class Surrounding {
   // Repeatedly takes a half-space that contains all vertices found and has the origin on its
   // boundary, and adds the farthest vertex outside it. When no half-space of this kind remains,
   // drops every vertex that is not needed. At most six remain (Steinitz 1913). Requires: the origin
-  // strictly inside A
-  // - B.
+  // strictly inside A - B.
   absl::StatusOr<std::vector<VertexPair>> Find() {
     while (const std::optional<IntegerVector> n = Escape(corners_)) {
       if (poll_.Step()) return absl::CancelledError("stopped in a certificate");

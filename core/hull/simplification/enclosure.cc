@@ -156,7 +156,7 @@ std::optional<SimplifiedHull> Enclosure::HullAround(std::span<const Corner> corn
 // Exact: a point outside the hull would become a vertex.
 bool Enclosure::ContainsAll(HullBuilder hull) {
   const std::span<const Vector> all = full_.vertices();
-  const auto holds = [&](std::span<const Vector> points) {
+  const auto contains = [&](std::span<const Vector> points) {
     const absl::StatusOr<PointCounts> counts = hull.Add(points);
     HULLD_CHECK(counts.ok());
     return counts->outside == 0;
@@ -164,10 +164,11 @@ bool Enclosure::ContainsAll(HullBuilder hull) {
   std::vector<Vector> sample;
   const size_t stride = all.size() / kVerticesPerCheck + 1;
   for (size_t i = 0; i < all.size(); i += stride) sample.push_back(all[i]);
-  if (!holds(sample)) return false;
+  if (!contains(sample)) return false;
   for (size_t first = 0; first < all.size(); first += kVerticesPerCheck) {
     if (poll_.Poll()) return false;
-    if (!holds(all.subspan(first, std::min(kVerticesPerCheck, all.size() - first)))) return false;
+    if (!contains(all.subspan(first, std::min(kVerticesPerCheck, all.size() - first))))
+      return false;
   }
   return true;
 }

@@ -38,7 +38,8 @@ struct SimplifiedHull {
 //
 // With max_vertices alone, the result has that many vertices, or all if there are fewer. With
 // max_error, it has few vertices for an error of at most max_error, or as many as max_vertices
-// permits. Errors:
+// permits.
+//
 // INVALID_ARGUMENT: no limit, a max_error that is negative, infinite or NaN, or fewer vertices than
 // needed to preserve the dimension (dimension + 1). CANCELLED: should_stop returned true.
 //

@@ -23,7 +23,7 @@ namespace hulld {
 namespace {
 
 // Maximum number of seed vertices to insert, each in O(facets). The last ones are inserted, because
-// they are nearest. A choice.
+// they are nearest. Not tuned.
 constexpr size_t kMaxSeeds = 1024;
 
 // The plane n.w = offset of a facet, n outward. `key` is its signed distance from the origin in

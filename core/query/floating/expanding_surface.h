@@ -23,7 +23,7 @@ class ExpandingSurface {
     bool alive = true;
   };
 
-  // `memory`: of the facets and the lists.
+  // `memory` must outlive this; the facets and lists are allocated from it.
   explicit ExpandingSurface(std::pmr::memory_resource* memory = std::pmr::get_default_resource())
       : facets_(memory), horizon_(memory), stack_(memory) {}
 

@@ -42,8 +42,8 @@ struct Plane {
   bool outward = false;
 };
 
-// Memory that is part of this object, and from the heap once that is used up. Memory of the object
-// is not used again, so callers reserve the usual sizes.
+// Memory for the usual polytope inside this object; larger polytopes use the heap. The object's
+// memory is not reused after deallocation, so callers reserve the usual sizes.
 class OwnMemory : public std::pmr::memory_resource {
  private:
   void* do_allocate(size_t bytes, size_t alignment) override {

@@ -156,10 +156,10 @@ SeparationBounds WalkSmall(const FloatPair& pair, const PlainVector& n,
              : WalkSmallPortably<kMaxVertices>(pair, n, start, goal);
 }
 
-// Returns the weights of the corners of a simplex in its point nearest to the origin, if that is
-// inside it: not negative, with a sum within 8 u of 1. Otherwise the point may be a farther one.
-// NaN if rounding leaves no positive weight. count: of the corners, 1 to 3; the others are not
-// used.
+// Returns the weights of the corners of a simplex in its point nearest to the origin, if that point
+// is inside the simplex; otherwise in some point of the simplex. The weights are not negative, and
+// their sum is within 8 u of 1. NaN if rounding leaves no positive weight. count: the number of
+// corners, 1 to 3; the other arguments are not used.
 std::array<double, 3> WeightsInside(const PlainVector& p, const PlainVector& q,
                                     const PlainVector& r, size_t count) {
   if (count == 1) return {1, 0, 0};
@@ -181,14 +181,15 @@ std::array<double, 3> WeightsInside(const PlainVector& p, const PlainVector& q,
   return {scale * of_p, scale * of_q, scale * of_r};
 }
 
-// Bounds the distance by the end of a search: by the reach of A - B along n, and by the nearest
-// point of the simplex. The length of n and the quotient err by 4 u of themselves in total, less
-// than kReachErrorFactor allows for the length of a unit vector. Requires: `simplex` is not empty.
+// Bounds the distance by the result of a search: from below by the reach of A - B along n, from
+// above by the nearest point of the simplex. The length of n and the quotient err by 4 u of
+// themselves in total, less than kReachErrorFactor allows for the length of a unit vector.
+// Requires: `simplex` is not empty.
 SeparationBounds BoundsAtEnd(const FloatPair& pair, const PlainVector& n, double reach,
                              std::span<const VertexPair> simplex) {
   SeparationBounds bounds;
   bounds.point.count = static_cast<uint32_t>(simplex.size());
-  // Without loops, so that the corners stay in registers. Repeats the last one.
+  // Without loops, so that the corners stay in registers. Repeats the last corner.
   const VertexPair first = simplex[0];
   const VertexPair second = simplex[simplex.size() > 1 ? 1 : 0];
   const VertexPair third = simplex.back();

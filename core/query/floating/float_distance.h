@@ -15,8 +15,8 @@ namespace hulld {
 // independently of the walk: the distance is at most that of any point of A - B, and at least minus
 // the reach of A - B along any unit vector. `n`: the initial direction; zero gives no bounds.
 // `start`: pairs where the walk begins, for example those where a search of the relation ended; at
-// most three, may be empty. `reach`: FloatSearchResult::reach along n if known; there is no walk if
-// it and `start` meet the goal. The bounds may miss the goal. Requires: pair.usable().
+// most three, may be empty. `reach`: FloatSearchResult::reach along n, if known; if it and `start`
+// meet the goal, the walk is skipped. The bounds may miss the goal. Requires: pair.usable().
 SeparationBounds BoundDistance(const FloatPair& pair, const Vector& n,
                                std::span<const VertexPair> start, const SeparationGoal& goal,
                                double reach = INFINITY);

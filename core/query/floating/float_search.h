@@ -39,8 +39,8 @@ inline constexpr double kEndsAtSign = -1;
 // SEPARATED: the support value is below -SupportError. OVERLAPPING: the origin is inside a
 // tetrahedron of vertices of A - B by more than the error of its volumes. WITHIN_TOLERANCE: a point
 // of A - B and a supporting plane of A - B are both within the tolerance of the origin. `first`:
-// the initial direction, for example from A's center to B's. Requires: pair.usable().
-// Fills `result`, which must be newly constructed.
+// the initial direction, for example from A's center to B's. Fills `result`, which must be newly
+// constructed. Requires: pair.usable().
 void SearchInFloatingPoint(const FloatPair& pair, double tolerance, const PlainVector& first,
                            double max_error, FloatSearchResult& result);
 inline FloatSearchResult SearchInFloatingPoint(const FloatPair& pair, double tolerance,

@@ -14,8 +14,8 @@ namespace {
 // Maximum number of support vertices of a cast. A cast needs more only if rounding hinders it. Not
 // tuned.
 constexpr int kMaxSteps = 96;
-// Share of the time up to a plane that its interval leaves open, more than rounding takes. A
-// choice.
+// Share of the time up to a plane that its interval leaves open, more than rounding takes. Not
+// tuned.
 constexpr double kOpenShare = 0x1p-40;
 // Weight of another point in the point that casts start from, so that symmetric hulls that move
 // along their symmetry axis are not a special case. Not tuned.

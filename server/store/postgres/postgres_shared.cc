@@ -74,7 +74,7 @@ constexpr char kPrepareShared[] = R"(
         INSERT INTO hulld.epochs (epoch, owner, batch, revision)
         SELECT epoch, $1, batch, revision FROM joined ON CONFLICT (epoch) DO NOTHING)
       SELECT epoch, batch, revision, store_id, hulls, vertices, bodies, relaxed FROM joined;
-    PREPARE hulld_turn AS SELECT batch FROM hulld.store FOR UPDATE;
+    PREPARE hulld_lock AS SELECT batch FROM hulld.store FOR UPDATE;
     PREPARE hulld_put_changes(bigint[], text[], bigint[], bigint[], bigint[], bigint[]) AS
       INSERT INTO hulld.changes (batch, id, revision, ended_at, began, body_began)
       SELECT * FROM unnest($1, $2, $3, $4, $5, $6);
@@ -237,13 +237,13 @@ absl::Status PostgresStore::Fetch() {
       "cannot read changes of peer servers from the database: ", rows.status().message()));
 }
 
-// Runs one transaction in two round trips. The first takes the turn, which lasts until the end of
-// the transaction: batches are serialized, and all earlier commits of peer servers are known. So
+// Runs one transaction in two round trips. The first takes the commit lock until the end of the
+// transaction: batches are serialized, and all earlier commits of peer servers are known. So
 // the new revisions are the next ones, and no server reads a batch before its predecessor. batch:
 // the batch that may have been committed if the session is lost.
 absl::Status PostgresStore::AttemptShared(std::span<Change* const> changes, Batch* batch) {
-  const Statement turn[] = {{.text = "BEGIN"}, {.name = "hulld_turn"}, FetchStatement(batch_)};
-  const absl::StatusOr<std::vector<Rows>> before = writer_->Ask(turn);
+  const Statement locking[] = {{.text = "BEGIN"}, {.name = "hulld_lock"}, FetchStatement(batch_)};
+  const absl::StatusOr<std::vector<Rows>> before = writer_->Ask(locking);
   const absl::Status status = before.ok() ? NotePeerChanges(before->back()) : before.status();
   std::vector<Change*> kept;
   for (Change* change : changes) {
@@ -263,7 +263,7 @@ absl::Status PostgresStore::AttemptShared(std::span<Change* const> changes, Batc
     *batch = next;
     return SendBatch(std::move(statements), next);
   }
-  // Returns the turn without a write.
+  // Releases the commit lock without a write.
   EndTransaction(status);
   return status;
 }
@@ -280,9 +280,9 @@ void PostgresStore::GiveNewId() {
     spdlog::error("cannot assign a new ID to the store: {}", std::string(status.message()));
 }
 
-// Returns true if this server's batch was committed. Takes the turn first: by then the transaction
-// that held it has ended, and nothing of it can arrive later because its COMMIT was sent before.
-// The sync of this transaction covers earlier commits.
+// Returns true if this server's batch was committed. Takes the commit lock first: by then the
+// transaction that held it has ended, and nothing of it can arrive later because its COMMIT was
+// sent before. The sync of this transaction covers earlier commits.
 absl::StatusOr<bool> PostgresStore::SharedOutcome(uint64_t batch) {
   HULLD_RETURN_IF_ERROR(RenewWriter());
   const Statement statements[] = {{.text = "BEGIN"},
@@ -294,9 +294,9 @@ absl::StatusOr<bool> PostgresStore::SharedOutcome(uint64_t batch) {
   return last.count() == 1 && last.bigint(0, 0) == batch;
 }
 
-// Ends sessions that hold the turn without sending anything, such as the session of a server that
-// stalls while sending a batch: PostgreSQL has timeouts between transactions and between batches of
-// statements, but not within a batch.
+// Ends sessions that hold the commit lock without sending anything, such as the session of a server
+// that stalls while sending a batch: PostgreSQL has timeouts between transactions and between
+// batches of statements, but not within a batch.
 absl::Status PostgresStore::EndStuckTransactions() {
   return keeper_session_
       ->Run(absl::StrCat(

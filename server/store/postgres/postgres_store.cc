@@ -201,7 +201,7 @@ absl::Status PostgresStore::Commit(std::span<Change* const> changes) {
       const absl::StatusOr<bool> committed = FindOutcome(batch.number, deadline);
       if (!committed.ok()) {
         const absl::Status unknown = OutcomeUnknown(status);
-        // The next turn of a shared store settles the outcome.
+        // The next transaction of a shared store settles the outcome.
         if (!options_.shared) unknown_ = unknown;
         return WriteFailed(unknown);
       }

@@ -60,8 +60,8 @@ struct PostgresOptions {
   // Shared: interval of polling for commits of peer servers without notices; with notices, it is
   // one heartbeat.
   std::chrono::milliseconds poll_interval{100};
-  // Shared: maximum time that a session may hold the turn while the database waits for the rest of
-  // its batch, for example because its server stalls. The session is then ended.
+  // Shared: maximum time that a session may hold the commit lock while the database waits for the
+  // rest of its batch, for example because its server stalls. The session is then ended.
   std::chrono::milliseconds longest_send{30'000};
 };
 
@@ -84,12 +84,12 @@ struct PostgresOptions {
 //
 // If shared, several servers are active concurrently (postgres_shared.cc). They share the advisory
 // lock and belong to one epoch, so that they cannot run alongside a server that requires exclusive
-// access. A transaction first takes the turn: it locks the store's row. It then reads the commits
-// of peer servers that this server has not seen, and numbers its revisions after theirs. Changes to
-// IDs that peer servers changed are skipped, and the registry retries them. The committing server
-// notifies its peers (BatchNotices), which also poll. COMMIT is sent only by a session that holds
-// the turn, so none can arrive after the turn has passed on; a server that lost the answer looks
-// for its batch after it has the turn again.
+// access. A transaction first takes the commit lock, the lock of the store's row. It then reads the
+// commits of peer servers that this server has not seen, and numbers its revisions after theirs.
+// Changes to IDs that peer servers changed are skipped, and the registry retries them. The
+// committing server notifies its peers (BatchNotices), which also poll. COMMIT is sent only by a
+// session that holds the commit lock, so none can arrive after the lock was released; a server that
+// lost the answer looks for its batch after it has acquired the lock again.
 class PostgresStore : public Store, public PeerFeed {
  public:
   // Waits while another server is active, unless take_over. Creates the schema if it is missing.
