@@ -317,16 +317,9 @@ absl::StatusOr<bool> AnyCollides(const Client& client, const v1::FindCollisionsR
 }
 
 AnswerFeed::AnswerFeed(const Client& client, std::shared_ptr<PageChannel> page)
-    : client_(client), page_(std::move(page)), thread_([this] { Run(); }) {}
-
-AnswerFeed::~AnswerFeed() {
-  {
-    const std::lock_guard lock(mutex_);
-    ended_ = true;
-  }
-  changed_.notify_all();
-  thread_.join();
-}
+    : client_(client),
+      page_(std::move(page)),
+      thread_([this](const std::stop_token& stop) { Run(stop); }) {}
 
 void AnswerFeed::Show(const ViewScene& scene, uint64_t number) {
   const std::lock_guard lock(mutex_);
@@ -375,13 +368,13 @@ void AnswerFeed::HullsChanged() {
   changed_.notify_all();
 }
 
-void AnswerFeed::Run() {
+void AnswerFeed::Run(const std::stop_token& stop) {
   while (true) {
     Query query;
     {
       std::unique_lock lock(mutex_);
-      changed_.wait(lock, [this] { return asked_ || ended_; });
-      if (ended_) return;
+      changed_.wait(lock, stop, [this] { return asked_; });
+      if (stop.stop_requested()) return;
       query = query_;
       asked_ = false;
       query_.motion_is_stale = false;

@@ -5,6 +5,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <thread>
 #include <vector>
@@ -18,12 +19,10 @@ namespace hulld {
 
 // Answers the queries of a page on its own thread. Queries that arrive while one is in flight are
 // merged, and the latest poses win, because the pointer moves faster than answers arrive.
-// Thread-safe.
+// The destructor waits for the answer in flight. Thread-safe.
 class AnswerFeed {
  public:
   AnswerFeed(const Client& client, std::shared_ptr<PageChannel> page);
-  // Waits for the answer in flight.
-  ~AnswerFeed();
 
   // Switches to another scene, by number; drops objects and queries.
   void Show(const ViewScene& scene, uint64_t number);
@@ -49,7 +48,7 @@ class AnswerFeed {
     bool motion_is_stale = true;
   };
 
-  void Run();
+  void Run(const std::stop_token& stop);
   // Sends the answer about the pair. Returns false if the page has closed.
   bool AnswerPair(const Query& query);
   absl::StatusOr<std::string> MovingAnswer(const Query& query);
@@ -74,13 +73,13 @@ class AnswerFeed {
   std::string asked_motion_;
 
   std::mutex mutex_;
-  std::condition_variable changed_;
+  std::condition_variable_any changed_;
   // Guarded by the mutex, like all members below.
   Query query_;
   uint64_t scene_ = 0;
   bool asked_ = false;
-  bool ended_ = false;
-  std::thread thread_;
+  // Stopped and joined first.
+  std::jthread thread_;
 };
 
 // Returns all data shown about a pair, from one query; tolerant_json: its member `tolerant`

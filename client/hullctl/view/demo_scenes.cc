@@ -186,16 +186,9 @@ absl::StatusOr<std::vector<ViewScene>> MakeDemoScenes(const Client& client, Temp
 }
 
 GrowingHull::GrowingHull(const Client& client, std::string hull_id)
-    : client_(client), hull_id_(std::move(hull_id)), thread_([this] { Run(); }) {}
-
-GrowingHull::~GrowingHull() {
-  {
-    const std::lock_guard lock(mutex_);
-    ended_ = true;
-  }
-  changed_.notify_all();
-  thread_.join();
-}
+    : client_(client),
+      hull_id_(std::move(hull_id)),
+      thread_([this](const std::stop_token& stop) { Run(stop); }) {}
 
 void GrowingHull::Restart() {
   {
@@ -205,21 +198,21 @@ void GrowingHull::Restart() {
   changed_.notify_all();
 }
 
-void GrowingHull::Run() {
+void GrowingHull::Run(const std::stop_token& stop) {
   uint64_t started = 0;
   while (true) {
     {
       std::unique_lock lock(mutex_);
-      changed_.wait(lock, [&] { return starts_ != started || ended_; });
-      if (ended_) return;
+      changed_.wait(lock, stop, [&] { return starts_ != started; });
+      if (stop.stop_requested()) return;
       started = starts_;
     }
-    Grow(started);
+    Grow(started, stop);
   }
 }
 
 // An error, such as a lost server, ends the growth; the viewer shows the state reached.
-void GrowingHull::Grow(uint64_t start) {
+void GrowingHull::Grow(uint64_t start, const std::stop_token& stop) {
   v1::ReplaceOpen open;
   open.set_hull_id(hull_id_);
   if (!client_.ReplaceHull(open, SendGrowth).ok()) return;
@@ -231,7 +224,8 @@ void GrowingHull::Grow(uint64_t start) {
   for (int step = 2; step <= kGrowthSteps; ++step) {
     if (!(*appender)->Append(GrowthOf(step)).ok()) return;
     std::unique_lock lock(mutex_);
-    if (changed_.wait_for(lock, kGrowthPause, [&] { return starts_ != start || ended_; })) return;
+    changed_.wait_for(lock, stop, kGrowthPause, [&] { return starts_ != start; });
+    if (starts_ != start || stop.stop_requested()) return;
   }
   static_cast<void>((*appender)->Finish());
 }

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <stop_token>
 #include <string>
 #include <thread>
 #include <vector>
@@ -18,30 +19,28 @@
 namespace hulld {
 
 // A hull that grows while it is displayed: points in balls of increasing radius are streamed into
-// it.
+// it. The destructor stops the growth.
 class GrowingHull {
  public:
   // Requires that `hull_id` exists. Growth starts with Restart.
   GrowingHull(const Client& client, std::string hull_id);
-  // Stops the growth.
-  ~GrowingHull();
 
   // Replaces the hull and grows it from the start. Does not wait.
   void Restart();
 
  private:
-  void Run();
+  void Run(const std::stop_token& stop);
   // Grows the hull until it is complete, or another start is requested.
-  void Grow(uint64_t start);
+  void Grow(uint64_t start, const std::stop_token& stop);
 
   const Client& client_;
   const std::string hull_id_;
   std::mutex mutex_;
-  std::condition_variable changed_;
+  std::condition_variable_any changed_;
   // Guarded by the mutex: number of calls of Restart.
   uint64_t starts_ = 0;
-  bool ended_ = false;
-  std::thread thread_;
+  // Stopped and joined first.
+  std::jthread thread_;
 };
 
 // Creates the textbook's scenes, also used by client/demo.sh, keys 0 to 7:

@@ -44,16 +44,9 @@ std::string FrameFor(const Client& client, const ShapeFiles& files, const ShapeR
 }
 
 GeometryFeed::GeometryFeed(const Client& client, std::shared_ptr<PageChannel> page)
-    : client_(client), page_(std::move(page)), thread_([this] { Run(); }) {}
-
-GeometryFeed::~GeometryFeed() {
-  {
-    const std::lock_guard lock(mutex_);
-    ended_ = true;
-  }
-  changed_.notify_all();
-  thread_.join();
-}
+    : client_(client),
+      page_(std::move(page)),
+      thread_([this](const std::stop_token& stop) { Run(stop); }) {}
 
 void GeometryFeed::Show(const ShapeFiles& files) {
   const std::lock_guard lock(mutex_);
@@ -79,11 +72,11 @@ void GeometryFeed::Ask(const std::vector<ShapeRequest>& shapes) {
   }
 }
 
-void GeometryFeed::Run() {
+void GeometryFeed::Run(const std::stop_token& stop) {
   while (true) {
     std::unique_lock lock(mutex_);
-    changed_.wait(lock, [this] { return !waiting_.empty() || ended_; });
-    if (ended_) return;
+    changed_.wait(lock, stop, [this] { return !waiting_.empty(); });
+    if (stop.stop_requested()) return;
     const ShapeRequest shape = std::move(waiting_.front());
     waiting_.pop_front();
     const std::shared_ptr<const ShapeFiles> files = files_;

@@ -5,6 +5,7 @@
 #include <deque>
 #include <memory>
 #include <mutex>
+#include <stop_token>
 #include <string>
 #include <thread>
 #include <vector>
@@ -18,12 +19,11 @@ namespace hulld {
 
 using ShapeFiles = std::vector<std::shared_ptr<const FileShape>>;
 
-// Sends the shapes requested by one page, in order, on its own thread. Thread-safe.
+// Sends the shapes requested by one page, in order, on its own thread. The destructor waits for the
+// shape in flight, and drops pending requests. Thread-safe.
 class GeometryFeed {
  public:
   GeometryFeed(const Client& client, std::shared_ptr<PageChannel> page);
-  // Waits for the shape in flight; drops pending requests.
-  ~GeometryFeed();
   GeometryFeed(const GeometryFeed&) = delete;
   GeometryFeed& operator=(const GeometryFeed&) = delete;
 
@@ -32,17 +32,17 @@ class GeometryFeed {
   void Ask(const std::vector<ShapeRequest>& shapes);
 
  private:
-  void Run();
+  void Run(const std::stop_token& stop);
 
   const Client& client_;
   const std::shared_ptr<PageChannel> page_;
   std::mutex mutex_;
-  std::condition_variable changed_;
+  std::condition_variable_any changed_;
   // Guarded by the mutex: the files of the scene, and the pending requests.
   std::shared_ptr<const ShapeFiles> files_ = std::make_shared<ShapeFiles>();
   std::deque<ShapeRequest> waiting_;
-  bool ended_ = false;
-  std::thread thread_;
+  // Stopped and joined first.
+  std::jthread thread_;
 };
 
 // Returns the frame for a request. For a body, `pieces`, unless null, receives the IDs of its
