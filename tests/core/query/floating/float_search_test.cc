@@ -20,6 +20,25 @@ double DistanceAtEnd(const FloatPair& pair, const FloatSearchResult& found) {
   return DistanceOfTriangle(pair, pairs);
 }
 
+// Two hulls of random points on unit spheres. B is shifted by 1.5 to `farthest` along x, and by up
+// to 1 along y and z.
+struct RandomPair {
+  RandomPair(Random& random, int vertices_a, int vertices_b, double farthest)
+      : hull_a(BuildHull(RandomOnSphere(random, vertices_a, 1))),
+        hull_b(BuildHull(RandomOnSphere(random, vertices_b, 1))) {
+    X_WB.t = Vector(random.Real(1.5, farthest), random.Real(-1, 1), random.Real(-1, 1));
+    b = *PlacedHull::Make(query_b, X_WB);
+  }
+
+  const Hull hull_a;
+  const Hull hull_b;
+  const QueryHull query_a{hull_a};
+  const QueryHull query_b{hull_b};
+  Pose X_WB;
+  PlacedHull a = *PlacedHull::Make(query_a, Pose());
+  PlacedHull b = *PlacedHull::Make(query_b, Pose());
+};
+
 // Half the width is the error, so the end of the search may be twice as far from the nearest point.
 TEST(FloatSearch, ASeparatedPairIsSearchedUntilTheErrorIsReached) {
   Random random(20261127);
@@ -28,19 +47,12 @@ TEST(FloatSearch, ASeparatedPairIsSearchedUntilTheErrorIsReached) {
   uint64_t directions[std::size(kErrors)] = {};
   for (int round = 0; round < 400; ++round) {
     const int vertices = round % 2 == 0 ? 8 : 100;
-    const Hull hull_a = BuildHull(RandomOnSphere(random, vertices, 1));
-    const Hull hull_b = BuildHull(RandomOnSphere(random, vertices, 1));
-    const QueryHull query_a(hull_a);
-    const QueryHull query_b(hull_b);
-    Pose X_WB;
-    X_WB.t = Vector(random.Real(1.5, 2), random.Real(-1, 1), random.Real(-1, 1));
-    const PlacedHull a = *PlacedHull::Make(query_a, Pose());
-    const PlacedHull b = *PlacedHull::Make(query_b, X_WB);
+    const RandomPair hulls(random, vertices, vertices, 2);
     QueryOptions options;
     options.want_separation = true;
-    const Answer answer = *CheckCollision(a, b, options);
+    const Answer answer = *CheckCollision(hulls.a, hulls.b, options);
     if (answer.relation != Relation::kSeparated) continue;
-    const FloatPair pair(a, b);
+    const FloatPair pair(hulls.a, hulls.b);
     for (size_t i = 0; i < std::size(kErrors); ++i) {
       const FloatSearchResult found =
           SearchInFloatingPoint(pair, 0, -pair.CenterDifference(), kErrors[i]);
@@ -61,15 +73,8 @@ TEST(FloatSearch, TheEndOfASearchBoundsTheDistance) {
   Random random(20261128);
   int counts[4] = {};
   for (int round = 0; round < 400; ++round) {
-    const Hull hull_a = BuildHull(RandomOnSphere(random, 4 + round % 5, 1));
-    const Hull hull_b = BuildHull(RandomOnSphere(random, round % 2 == 0 ? 8 : 100, 1));
-    const QueryHull query_a(hull_a);
-    const QueryHull query_b(hull_b);
-    Pose X_WB;
-    X_WB.t = Vector(random.Real(1.5, 3), random.Real(-1, 1), random.Real(-1, 1));
-    const PlacedHull a = *PlacedHull::Make(query_a, Pose());
-    const PlacedHull b = *PlacedHull::Make(query_b, X_WB);
-    const FloatPair pair(a, b);
+    const RandomPair hulls(random, 4 + round % 5, round % 2 == 0 ? 8 : 100, 3);
+    const FloatPair pair(hulls.a, hulls.b);
     const FloatSearchResult found = SearchInFloatingPoint(pair, 0, -pair.CenterDifference(), 0);
     if (found.verdict != FloatVerdict::kSeparated) continue;
     ++counts[found.pair_count];
