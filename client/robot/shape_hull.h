@@ -24,7 +24,7 @@ struct ShapeHull {
 // Returns the rounded hull of a shape. Box: its corners. Sphere: its center and radius. Capsule:
 // its segment and radius. These are exact, except for halving the smallest numbers. Cylinder: a
 // prism of kCylinderSides sides around it, as tight as possible within a few units of roundoff.
-// Requires sizes above 0, as ReadUrdf ensures, and no mesh.
+// Requires sizes of at least 0, as ReadUrdf ensures, and no mesh.
 ShapeHull PrimitiveHull(const CollisionShape& shape);
 inline constexpr int kCylinderSides = 32;
 

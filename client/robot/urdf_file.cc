@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <initializer_list>
 #include <map>
 #include <numeric>
 #include <optional>
@@ -118,6 +119,18 @@ class UrdfReader {
                               document_.LineOf(first)));
   }
 
+  // Returns an error if a child occurs twice; a reader would have to choose one.
+  absl::Status CheckUnique(pugi::xml_node element,
+                           std::initializer_list<const char*> children) const {
+    for (const char* const child : children) {
+      const pugi::xml_node second = element.child(child).next_sibling(child);
+      if (!second) continue;
+      return document_.ErrorAt(second, absl::StrCat("<", element.name(), "> contains <", child,
+                                                    "> twice; remove one of them"));
+    }
+    return absl::OkStatus();
+  }
+
   // Sets `number` to an attribute, if it exists.
   absl::Status TakeNumber(pugi::xml_node element, const char* attribute, double* number) const {
     if (!element.attribute(attribute)) return absl::OkStatus();
@@ -174,6 +187,7 @@ class UrdfReader {
 
   absl::Status TakeCollision(pugi::xml_node collision, CollisionShape* shape) const {
     shape->line = document_.LineOf(collision);
+    if (absl::Status good = CheckUnique(collision, {"origin", "geometry"}); !good.ok()) return good;
     if (absl::Status good = TakeOrigin(collision, &shape->X_LS); !good.ok()) return good;
     const pugi::xml_node geometry = collision.child("geometry");
     if (!geometry) return document_.ErrorAt(collision, "<collision> lacks <geometry>");
@@ -222,9 +236,9 @@ class UrdfReader {
     const auto numbers = NumbersOf(document_, shape, attribute, sizes.size());
     if (!numbers.ok()) return numbers.status();
     std::copy(numbers->begin(), numbers->end(), sizes.begin());
-    if (std::ranges::all_of(sizes, [](double size) { return size > 0; })) return absl::OkStatus();
-    return document_.ErrorAt(shape,
-                             absl::StrCat("<", shape.name(), "> ", attribute, " must be above 0"));
+    if (std::ranges::all_of(sizes, [](double size) { return size >= 0; })) return absl::OkStatus();
+    return document_.ErrorAt(
+        shape, absl::StrCat("<", shape.name(), "> ", attribute, " must not be negative"));
   }
 
   absl::StatusOr<std::string> LinkOf(pugi::xml_node joint, const char* end) const {
@@ -257,7 +271,9 @@ class UrdfReader {
                                 "floating"));
     }
     joint.joint.kind = *kind;
-    absl::Status good = TakeOrigin(element, &joint.joint.X_PJ);
+    absl::Status good =
+        CheckUnique(element, {"origin", "parent", "child", "axis", "limit", "mimic"});
+    if (good.ok()) good = TakeOrigin(element, &joint.joint.X_PJ);
     if (good.ok()) good = TakeAxis(element, &joint.joint);
     if (good.ok()) good = TakeLimits(element, &joint.joint);
     if (!good.ok()) return good;

@@ -115,6 +115,18 @@ TEST(UrdfFile, OriginsMayHaveQuaternions) {
   EXPECT_EQ(pose_of("quat_xyzw=\"0 1 0 0\""), (RigidPose{0, 0, 1, 0, 0, 0, 0}));
 }
 
+// Atlas has spheres of radius 0, and the Kinova arms have a box of size 0.
+TEST(UrdfFile, SizesMayBeZero) {
+  for (const char* shape :
+       {"<box size=\"0 0 0\"/>", "<box size=\"2 0 1\"/>", "<sphere radius=\"0\"/>",
+        "<capsule radius=\"0\" length=\"0\"/>", "<cylinder radius=\"0\" length=\"1\"/>"}) {
+    const auto robot = ParseUrdf(Changed("<box size=\"2 2 1\"/>", shape), "arm.urdf");
+    EXPECT_TRUE(robot.ok()) << robot.status();
+  }
+  EXPECT_THAT(ErrorOf(Changed("<box size=\"2 2 1\"/>", "<sphere radius=\"-0.1\"/>")),
+              HasSubstr("arm.urdf:5: <sphere> radius must not be negative"));
+}
+
 TEST(UrdfFile, ErrorsNameLineAndElement) {
   const std::pair<std::string, std::string> none = {"", ""};
   const struct {
@@ -123,7 +135,7 @@ TEST(UrdfFile, ErrorsNameLineAndElement) {
   } cases[] = {
       {{"size=\"2 2 1\"", "size=\"2 2\""}, "arm.urdf:5: <box> size needs 3 numbers, got 2"},
       {{"size=\"2 2 1\"", "size=\"2 two 1\""}, "arm.urdf:5: <box> size: \"two\" is not a number"},
-      {{"size=\"2 2 1\"", "size=\"2 0 1\""}, "arm.urdf:5: <box> size must be above 0"},
+      {{"size=\"2 2 1\"", "size=\"2 -1 1\""}, "arm.urdf:5: <box> size must not be negative"},
       {{"size=\"2 2 1\"", ""}, "arm.urdf:5: <box> lacks size=\"...\""},
       {{"<geometry><box", "<origin xyz=\"0 0 0\" rot=\"1 0 0\"/><geometry><box"},
        "arm.urdf:5: <origin> has no attribute \"rot\"; attributes are xyz, rpy, and quat_xyzw"},
@@ -135,6 +147,13 @@ TEST(UrdfFile, ErrorsNameLineAndElement) {
        "arm.urdf:5: <origin> quat_xyzw is not a unit quaternion"},
       {{"<geometry><box", "<geometry><sphere radius=\"1\"/><box"},
        "arm.urdf:5: <geometry> contains several shapes; write one <collision> for each"},
+      {{"<box size=\"2 2 1\"/></geometry>",
+        "<box size=\"2 2 1\"/></geometry><geometry><sphere radius=\"1\"/></geometry>"},
+       "arm.urdf:5: <collision> contains <geometry> twice; remove one of them"},
+      {{"<geometry><box", "<origin/><origin xyz=\"1 0 0\"/><geometry><box"},
+       "arm.urdf:5: <collision> contains <origin> twice"},
+      {{"<child link=\"upper\"/>", "<child link=\"upper\"/><child link=\"lower\"/>"},
+       "arm.urdf:8: <joint> contains <child> twice"},
       {{"<box size=\"2 2 1\"/>", "<cone/>"}, "arm.urdf:5: <geometry> contains \"cone\""},
       {{"<link name=\"upper\">", "<link>"}, "arm.urdf:12: <link> lacks name"},
       {{"<link name=\"upper\">", "<link name=\"base\">"},

@@ -250,6 +250,8 @@ def _read_binary_stl(path: pathlib.Path, data: bytes) -> npt.NDArray[np.float32]
     if len(data) < 84 or rest < 0:
         whole = max(0, len(data) - 84) // _TRIANGLE.itemsize
         raise ValueError(f"{path}: the file is cut short after {whole} of {count} triangles")
+    if count == 0 and rest == 0:
+        raise ValueError(f"{path}: the file contains no triangle")
     if count == 0 or (rest > 0 and rest % _TRIANGLE.itemsize == 0):
         raise ValueError(
             f"{path}: the header declares {count} triangles and {rest} bytes follow them; correct "

@@ -24,8 +24,8 @@ def read_urdf(path: str | os.PathLike[str]) -> Description:
     """Links, joints, and collision shapes of a file. Other elements are ignored.
 
     ValueError names file and line: malformed XML, a malformed number, a link or joint without a
-    name or with a duplicate name, a shape without a size above 0, links that form no tree, a joint
-    that mimics itself, or a planar joint without an axis.
+    name or with a duplicate name, a repeated element, a shape without a size or with a negative
+    one, links that form no tree, a joint that mimics itself, or a planar joint without an axis.
     """
     robot = read_xml(path, "robot")
     name = robot.require("name")
@@ -58,7 +58,7 @@ def read_urdf(path: str | os.PathLike[str]) -> Description:
     for joint in joint_order:
         parent, child = ends[joint]
         made = _joint_of(joints[joint], link_index[parent], link_index[child])
-        mimic = joints[joint].first("mimic")
+        mimic = joints[joint].only("mimic")
         if mimic is not None and made.kind != "fixed":
             made.mimics = joint_index[mimic.get("joint")]
             made.multiplier, made.offset = mimic.number("multiplier", 1), mimic.number("offset", 0)
@@ -84,7 +84,7 @@ def _by_name(robot: Element, tag: str) -> dict[str, Element]:
 
 
 def _end_of(joint: Element, end: str, links: dict[str, Element]) -> str:
-    element, name = joint.first(end), joint.get("name")
+    element, name = joint.only(end), joint.get("name")
     if element is None or not element.get("link"):
         raise joint.error(f'joint {name!r} lacks <{end} link="">')
     if element.get("link") not in links:
@@ -119,7 +119,7 @@ def _ordered(
 
 
 def _origin_of(element: Element) -> PoseNumbers:
-    origin = element.first("origin")
+    origin = element.only("origin")
     if origin is None:
         return NO_MOTION
     for name in origin.attributes:
@@ -161,7 +161,7 @@ def _shapes_of(link: Element) -> list[Shape]:
     shapes = []
     for collision in link.all("collision"):
         X_LS = _origin_of(collision)
-        geometry = collision.first("geometry")
+        geometry = collision.only("geometry")
         if geometry is None:
             raise collision.error("<collision> lacks <geometry>")
         element = next(iter(geometry.children), None)
@@ -184,9 +184,9 @@ def _shapes_of(link: Element) -> list[Shape]:
             kind, [("radius", 1), ("length", 1)]
         )
         size = [number for name, count in sizes for number in element.numbers(name, count)]
-        if not all(number > 0 for number in size):
+        if not all(number >= 0 for number in size):
             names = " and ".join(name for name, _ in sizes)
-            raise element.error(f"<{kind}> {names} must be above 0")
+            raise element.error(f"<{kind}> {names} must not be negative")
         shapes.append(Shape(kind, X_LS, collision.line, tuple(size)))
     return shapes
 
@@ -205,7 +205,7 @@ def _joint_of(element: Element, parent: int, child: int) -> Joint:
     joint = Joint(name, kind, parent, child, _origin_of(element))
     if kind in ("fixed", "floating"):
         return joint
-    axis = element.first("axis")
+    axis = element.only("axis")
     if axis is None and kind == "planar":
         # URDF's default, x, is rarely intended.
         raise element.error(f'joint {name!r} lacks <axis xyz="0 0 1"/>, the normal of its plane')
@@ -217,10 +217,10 @@ def _joint_of(element: Element, parent: int, child: int) -> Joint:
         joint.axis = (x / length, y / length, z / length) if length != 1 else (x, y, z)
     if kind in ("continuous", "planar"):
         return joint
-    limit = element.first("limit")
+    limit = element.only("limit")
     if limit is not None:
         joint.limits = (limit.number("lower", 0), limit.number("upper", 0))
-    elif element.first("mimic") is None:
+    elif element.only("mimic") is None:
         raise element.error(f'joint {name!r} lacks <limit lower="" upper="" ...>')
     return joint
 
@@ -228,7 +228,7 @@ def _joint_of(element: Element, parent: int, child: int) -> Joint:
 def _check_mimics(joints: dict[str, Element]) -> None:
     for name, element in joints.items():
         seen = {name}
-        mimic = element.first("mimic")
+        mimic = element.only("mimic")
         while mimic is not None:
             leader = mimic.get("joint")
             if leader not in joints:
@@ -242,7 +242,7 @@ def _check_mimics(joints: dict[str, Element]) -> None:
             if leader in seen:
                 raise element.error(f"joint {name!r} mimics itself through other joints")
             seen.add(leader)
-            mimic = joints[leader].first("mimic")
+            mimic = joints[leader].only("mimic")
 
 
 def read_disabled_pairs(path: str | os.PathLike[str], robot: Description) -> set[tuple[int, int]]:

@@ -31,8 +31,12 @@ class Element:
         """The children with that tag, in order."""
         return (child for child in self.children if child.tag == tag)
 
-    def first(self, tag: str) -> Element | None:
-        return next(self.all(tag), None)
+    def only(self, tag: str) -> Element | None:
+        """The child with that tag, if any. ValueError: there are several."""
+        found = list(self.all(tag))
+        if len(found) > 1:
+            raise found[1].error(f"<{self.tag}> contains <{tag}> twice; remove one of them")
+        return found[0] if found else None
 
     def get(self, name: str) -> str:
         """An attribute; "" if it is missing."""

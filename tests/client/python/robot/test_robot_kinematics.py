@@ -152,6 +152,13 @@ def test_configurations_are_checked(write: Write) -> None:
 # --- Descriptions ---
 
 
+# Atlas has spheres of radius 0, and the Kinova arms have a box of size 0.
+@pytest.mark.parametrize("shape", ['<box size="0 0 0"/>', '<sphere radius="0"/>'])
+def test_sizes_may_be_zero(write: Write, shape: str) -> None:
+    description = read_urdf(write(ARM.replace('<box size="1 1 1"/>', shape, 1)))
+    assert set(description.links[0].shapes[0].size) == {0}
+
+
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
@@ -189,13 +196,19 @@ def test_configurations_are_checked(write: Write) -> None:
         ('joint="j1"', 'joint="j9"', "14: joint 'j3' mimics a joint that does not exist: 'j9'"),
         ('joint="j1"', 'joint="j3"', "12: joint 'j3' mimics itself"),
         ('joint="j1"', 'joint="cart"', "14: joint 'cart' is planar"),
-        ('<box size="1 1 1"/>', '<box size="1 0 1"/>', "2: <box> size must be above 0"),
+        ('<box size="1 1 1"/>', '<box size="1 -1 1"/>', "2: <box> size must not be negative"),
         ('<box size="1 1 1"/>', '<box size="1 1"/>', "2: <box> size needs 3 numbers, got 2"),
         (
             '<box size="1 1 1"/>',
             '<cone size="1 1"/>',
             "2: <geometry> contains 'cone'; it must contain a box",
         ),
+        (
+            "</geometry></collision>",
+            '</geometry><geometry><sphere radius="1"/></geometry></collision>',
+            "2: <collision> contains <geometry> twice; remove one of them",
+        ),
+        (LIMIT, LIMIT + LIMIT, "5: <joint> contains <limit> twice"),
         ('<box size="1 1 1"/>', "", "2: <geometry> contains nothing"),
         (
             '<box size="1 1 1"/>',
