@@ -43,13 +43,16 @@ class GltfWalk {
   absl::Status Run() {
     if (absl::Status s = document_.Load(); !s.ok()) return s;
     VisitScene();
+    place_.clear();
     if (ok() && vertices_ == 0) Fail("the meshes of the scene have no vertex");
     return document_.status();
   }
 
  private:
   bool ok() const { return document_.ok(); }
-  void Fail(const std::string& message) { document_.Fail(message); }
+  void Fail(const std::string& message) {
+    document_.Fail(place_.empty() ? message : absl::StrCat(Quoted(place_), ": ", message));
+  }
 
   static std::vector<std::array<uint32_t, 3>> Triangles(const std::vector<uint32_t>& corners,
                                                         size_t mode) {
@@ -219,6 +222,7 @@ class GltfWalk {
 
   // X_WN: null for the identity. node: empty if the file has none.
   void VisitMesh(size_t index, const Affine* X_WN, const Struct& node, Primitive primitive) {
+    place_ = primitive.node;
     const Struct& mesh = document_.Element("meshes", index);
     const Struct& weighted = GltfDocument::Find(node, "weights") != nullptr ? node : mesh;
     const std::vector<double> weights = document_.NumbersOf(
@@ -239,8 +243,19 @@ class GltfWalk {
     return X;
   }
 
+  // Returns the name of element `index` of a list, or the location if it has none.
+  std::string NameOf(const Struct& element, const char* list, size_t index) {
+    const std::string name = document_.TextOf(element, "name");
+    return name.empty() ? absl::StrCat(list, "[", index, "]") : name;
+  }
+
   // Returns nullopt if the node has no transform.
   std::optional<Affine> TransformOf(const Struct& node) {
+    for (const char* const other : {"translation", "rotation", "scale"}) {
+      if (GltfDocument::Find(node, "matrix") == nullptr) break;
+      if (GltfDocument::Find(node, other) == nullptr) continue;
+      Fail(absl::StrCat("has both matrix and ", other, "; remove one of them"));
+    }
     const std::vector<double> columns = document_.NumbersOf(node, "matrix", 16);
     const std::vector<double> t = document_.NumbersOf(node, "translation", 3);
     const std::vector<double> q = document_.NumbersOf(node, "rotation", 4);
@@ -280,7 +295,8 @@ class GltfWalk {
       pending.pop_back();
       const Struct& node = document_.Element("nodes", index);
       if (!ok()) return;
-      if (X_WN_[index]) return Fail(absl::StrCat("nodes[", index, "] has several parents"));
+      place_ = NameOf(node, "nodes", index);
+      if (X_WN_[index]) return Fail("has several parents");
       if (GltfDocument::Find(document_.ObjectOf(node, "extensions"), "EXT_mesh_gpu_instancing") !=
           nullptr) {
         return document_.RefuseExtension("EXT_mesh_gpu_instancing");
@@ -298,22 +314,27 @@ class GltfWalk {
     for (const size_t index : order) {
       if (!ok()) return;
       const Struct& node = document_.Element("nodes", index);
-      std::string name = document_.TextOf(node, "name");
-      if (name.empty()) name = absl::StrCat("nodes[", index, "]");
       if (const auto mesh = document_.IntegerOf(node, "mesh"); ok() && mesh) {
         VisitMesh(*mesh, is_moved[index] ? &*X_WN_[index] : nullptr, node,
-                  {name, index, {}, false});
+                  {NameOf(node, "nodes", index), index, {}, false});
       }
     }
   }
 
+  // Visits the default scene, or all scenes if there is no default. Scenes may share nodes.
   void VisitScene() {
     std::vector<size_t> roots;
-    if (document_.CountOf("scenes") > 0) {
-      const Struct& scene =
-          document_.Element("scenes", document_.IntegerOf(document_.root(), "scene").value_or(0));
-      for (const Value& node : document_.ListOf(scene, "nodes").values()) {
-        roots.push_back(document_.Integer(node, "nodes"));
+    if (const size_t scenes = document_.CountOf("scenes"); scenes > 0) {
+      const auto chosen = document_.IntegerOf(document_.root(), "scene");
+      std::vector<bool> is_root(document_.CountOf("nodes"));
+      for (size_t i = chosen.value_or(0); i < (chosen ? *chosen + 1 : scenes) && ok(); ++i) {
+        for (const Value& node :
+             document_.ListOf(document_.Element("scenes", i), "nodes").values()) {
+          const size_t root = document_.Integer(node, "nodes");
+          if (root < is_root.size() && is_root[root]) continue;
+          if (root < is_root.size()) is_root[root] = true;
+          roots.push_back(root);
+        }
       }
       return VisitNodes(roots);
     }
@@ -332,9 +353,8 @@ class GltfWalk {
       return Fail("no node is a root: each one is the child of another");
     if (!roots.empty()) return VisitNodes(roots);
     for (size_t i = 0; i < document_.CountOf("meshes") && ok(); ++i) {
-      std::string name = document_.TextOf(document_.Element("meshes", i), "name");
-      if (name.empty()) name = absl::StrCat("meshes[", i, "]");
-      VisitMesh(i, nullptr, Struct::default_instance(), {name, i, {}, false});
+      VisitMesh(i, nullptr, Struct::default_instance(),
+                {NameOf(document_.Element("meshes", i), "meshes", i), i, {}, false});
     }
   }
 
@@ -343,6 +363,8 @@ class GltfWalk {
   // Transforms of the scene's nodes.
   std::vector<std::optional<Affine>> X_WN_;
   size_t vertices_ = 0;
+  // Name of the node or mesh that is read, for errors.
+  std::string place_;
 };
 
 }  // namespace

@@ -107,6 +107,43 @@ TEST(GltfFile, FilesWithoutScenesUseAllRoots) {
   EXPECT_EQ(ReadText(bare, PointFormat::kGltf).counts.points, 3u);
 }
 
+// A triangle at z = 5 in the first scene, and another at z = 7 in the second one, which also shows
+// the first.
+TEST(GltfFile, FilesWithoutADefaultSceneUseAllScenes) {
+  const std::string text = Replaced(
+      Gltf(Bytes(kTriangle), kFloats, R"(,"translation":[0,0,5]},{"mesh":0,"translation":[0,0,7])"),
+      R"("scene":0,"scenes":[{"nodes":[0]}])", R"("scenes":[{"nodes":[0]},{"nodes":[1,0]}])");
+  EXPECT_THAT(ReadText(text, PointFormat::kGltf).xyz(),
+              ElementsAre(0.1f, 0, 5, 1, 0, 5, 0, 2, 5, 0.1f, 0, 7, 1, 0, 7, 0, 2, 7));
+  const auto of_scene = [&text](const std::string& scene) {
+    return ReadText(Replaced(text, R"("scenes")", R"("scene":)" + scene + R"(,"scenes")"),
+                    PointFormat::kGltf);
+  };
+  EXPECT_THAT(of_scene("0").xyz(), ElementsAre(0.1f, 0, 5, 1, 0, 5, 0, 2, 5));
+  EXPECT_EQ(of_scene("1").counts.points, 6u);
+  EXPECT_EQ(of_scene("2").error(), "FILE: scenes[2] is out of range; the list's size is 2");
+}
+
+TEST(GltfFile, ErrorsOfPrimitivesNameTheNode) {
+  EXPECT_EQ(Error(Replaced(Gltf(Bytes(kTriangle), kFloats, R"(,"name":"arm")"),
+                           R"("primitives":[{)", R"("primitives":[{"mode":7,)")),
+            "FILE: \"arm\": a primitive has an unknown mode 7");
+  EXPECT_EQ(Error(Gltf(Bytes(kTriangle), kFloats, R"(,"rotation":[0,0,0,0])")),
+            "FILE: \"nodes[0]\": a rotation is not a unit quaternion");
+}
+
+TEST(GltfFile, NodesWithMatrixAndAnotherTransformAreRefusedByName) {
+  const std::string matrix = R"(,"matrix":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1])";
+  for (const char* const other :
+       {"translation\":[1,2,3]", "scale\":[1,1,1]", "rotation\":[0,0,0,1]"}) {
+    const std::string name(other, std::string(other).find('"'));
+    const std::string both = absl::StrCat(matrix, ",\"", other);
+    EXPECT_EQ(Error(Gltf(Bytes(kTriangle), kFloats, both + R"(,"name":"arm")")),
+              "FILE: \"arm\": has both matrix and " + name + "; remove one of them");
+    EXPECT_THAT(Error(Gltf(Bytes(kTriangle), kFloats, both)), HasSubstr("\"nodes[0]\": has both"));
+  }
+}
+
 TEST(GltfFile, NodesComposeMatricesAndRotations) {
   const std::string matrix = R"(,"matrix":[0,1,0,0,-1,0,0,0,0,0,1,0,10,0,0,1])";
   EXPECT_THAT(ReadText(Gltf(Bytes(kTriangle), kFloats, matrix), PointFormat::kGltf).xyz(),
