@@ -143,6 +143,7 @@ absl::Status WalkBinaryStl(ByteSource* source, const StlReceiver& receiver) {
   (void)source->Skip(std::numeric_limits<uint64_t>::max());
   if (!source->status().ok()) return source->status();
   const uint64_t extra = source->offset() - at;
+  if (count == 0 && extra == 0) return error_at("the file contains no triangle");
   if (count == 0 || (extra > 0 && extra % kTriangleBytes == 0)) {
     return error_at(absl::StrCat("the header declares ", Counted(count, "triangle"), " and ",
                                  Counted(extra, "byte"),
@@ -157,10 +158,13 @@ bool IsControl(char c) {
   return byte < 0x20 && !absl::ascii_isspace(byte);
 }
 
-// True if control characters are errors, because the header of a binary file would look different.
+// True if a file that contains control characters is text that was damaged, not binary: its header
+// would be unusual, and the count of triangles would be at least 2^27, as its high byte is text.
 bool IsDamagedText(std::string_view start) {
+  constexpr size_t kHighByteOfCount = kStlHeaderBytes + 3;
   const std::string text = absl::AsciiStrToLower(std::string(start));
-  return absl::StartsWith(text, "solid") && absl::StrContains(text, "facet normal");
+  return absl::StartsWith(text, "solid") && absl::StrContains(text, "facet normal") &&
+         !(start.size() > kHighByteOfCount && IsControl(start[kHighByteOfCount]));
 }
 
 }  // namespace

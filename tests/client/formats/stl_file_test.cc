@@ -125,7 +125,8 @@ std::string Binary(uint32_t count, uint32_t triangles, const std::string& header
 }
 
 TEST(BinaryStl, HeaderMayStartWithSolid) {
-  for (const char* header : {"", "solid", "solid made by a CAD program", "SOLID x\nfacet"}) {
+  for (const char* header : {"", "solid", "solid made by a CAD program", "SOLID x\nfacet",
+                             "solid x\nfacet normal 0 0 1"}) {
     for (const char* trailing : {"", "x", "trailing bytes that are no triangle"}) {
       const PointsRead read = ReadText(Binary(2, 2, header) + trailing, PointFormat::kStl);
       ASSERT_TRUE(read.status.ok()) << read.status;
@@ -145,10 +146,11 @@ TEST(BinaryStl, FewerOrMoreTrianglesThanDeclaredAreRefused) {
     EXPECT_THAT(Error(whole.substr(0, 83) + std::string(1, '\0')), HasSubstr("after 0 of 3"));
     EXPECT_THAT(Error(Binary(2, 3, header)),
                 HasSubstr("byte 184: the header declares 2 triangles and 50 bytes follow them"));
-    EXPECT_THAT(Error(Binary(0, 0, header)), HasSubstr("declares 0 triangles and 0 bytes"));
+    EXPECT_THAT(Error(Binary(0, 0, header)), HasSubstr("byte 84: the file contains no triangle"));
     EXPECT_THAT(Error(Binary(0, 1, header) + "x"), HasSubstr("declares 0 triangles and 51 bytes"));
     EXPECT_THAT(Error(Binary(4294967295u, 1, header)), HasSubstr("after 1 of 4294967295"));
   }
+  EXPECT_THAT(Error(Binary(3, 2, "solid with a facet normal")), HasSubstr("after 2 of 3"));
 }
 
 TEST(BinaryStl, MeshHasTheSameCornersAsThePoints) {
