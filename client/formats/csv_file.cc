@@ -116,10 +116,16 @@ absl::Status AddRow(const ByteSource& source, const std::vector<std::string_view
                     const CsvLayout& layout, PointCollector* points) {
   const auto& columns = layout.columns;
   const size_t named = layout.named;
-  // R's write.table names the columns of the data, but not the column of row names.
-  if (named > 0 && cells.size() > named && !cells[named].empty()) {
-    return source.ErrorAtLine(absl::StrCat("the row has ", Counted(cells.size(), "column"),
-                                           ", but the header names ", named, "; name each column"));
+  // R's write.table names the columns of the data, but not the column of row names. Without a
+  // header, only a further number is an error: a lost line end joins two rows.
+  double number = 0;
+  if (cells.size() > named &&
+      (layout.has_header ? !cells[named].empty()
+                         : ParseDouble(cells[named], &number) == NumberText::kNumber)) {
+    return source.ErrorAtLine(
+        absl::StrCat("the row has ", Counted(cells.size(), "column"),
+                     layout.has_header ? ", but the header names " : ", but the first row has ",
+                     named, layout.has_header ? "; name each column" : "; is a line end missing?"));
   }
   std::array<double, 3> xyz;
   for (size_t axis = 0; axis < 3; ++axis) {
@@ -232,6 +238,10 @@ absl::Status ReadCsv(ByteSource* source, PointCollector* points) {
     CsvLayout layout;
     layout.separator = declared.value_or(SeparatorOf(content));
     const std::string row(line);
+    std::vector<std::string_view> cells;
+    SplitRow(row, layout.separator, &cells);
+    layout.named = cells.size();
+    layout.has_header = false;
     const absl::Status checked = CheckFirstRow(source, row, layout.separator);
     return checked.ok() ? ReadCsvRows(source, layout, row, points) : checked;
   }

@@ -18,8 +18,9 @@ namespace hulld {
 struct CsvLayout {
   // Columns of x, y, and z.
   std::array<size_t, 3> columns = {0, 1, 2};
-  // Number of columns that the header names; 0 without a header.
+  // Number of columns that the header names or, without a header, of the first row.
   size_t named = 0;
+  bool has_header = true;
   // ' ': white space of any length.
   char separator = ',';
 };

@@ -75,6 +75,9 @@ std::optional<ScalarType> TypeFromName(std::string_view name) {
 
 absl::Status ParseFormat(const ByteSource& source, std::string_view rest, PlyHeader* header) {
   const std::string_view encoding = NextToken(&rest);
+  if (header->encoding != Encoding::kNone) {
+    return source.ErrorAtLine("the header has the line \"format\" twice");
+  }
   if (encoding == "ascii") {
     header->encoding = Encoding::kAscii;
   } else if (encoding == "binary_little_endian") {

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -89,6 +90,8 @@ absl::Status ParseCount(const ByteSource& source, const std::vector<std::string_
 }
 
 absl::Status ParsePcdHeader(ByteSource* source, PcdHeader* header) {
+  // Keywords that describe fields.
+  std::set<std::string> known;
   std::string_view line;
   while (source->ReadLine(&line)) {
     std::string_view rest = line.substr(0, line.find('#'));
@@ -101,6 +104,9 @@ absl::Status ParsePcdHeader(ByteSource* source, PcdHeader* header) {
       return absl::OkStatus();
     } else if (keyword == "FIELDS" || keyword == "COLUMNS" || keyword == "SIZE" ||
                keyword == "TYPE" || keyword == "COUNT") {
+      if (!known.emplace(keyword == "COLUMNS" ? "FIELDS" : keyword).second) {
+        return source->ErrorAtLine(absl::StrCat("the header has ", Quoted(keyword), " twice"));
+      }
       status = ParseFields(*source, keyword, values, header);
     } else if (keyword == "WIDTH") {
       status = ParseCount(*source, values, &header->width);

@@ -1,4 +1,6 @@
 // OBJ, OFF, XYZ, CSV, and the text forms of PLY and PCD.
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_replace.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -344,6 +346,22 @@ TEST(CsvFile, RowsWithMoreCellsThanTheHeaderAreErrors) {
   EXPECT_THAT(ReadText("x,y,z\n1,2,3,\n", PointFormat::kCsv).xyz(), ElementsAre(1, 2, 3));
 }
 
+// The last row was read as 7 8 910.
+TEST(CsvFile, RowsThatALostLineEndJoinedAreErrors) {
+  for (const char* separator : {",", ";", "\t", " "}) {
+    const auto read = [separator](const char* last) {
+      return ReadText(
+          absl::StrReplaceAll(absl::StrCat("1 2 3\n4 5 6\n", last, "\n"), {{" ", separator}}),
+          PointFormat::kCsv);
+    };
+    EXPECT_EQ(read("7 8 910 11 12").error(),
+              "FILE:3: the row has 5 columns, but the first row has 3; is a line end missing?");
+    // Labels may have any number of words.
+    EXPECT_EQ(read("7 8 9 a tree").counts.points, 3u) << separator;
+  }
+  EXPECT_EQ(ReadText("1 2 3 4 5\n6 7 8\n9 1 2 3 4\n", PointFormat::kCsv).counts.points, 3u);
+}
+
 TEST(CsvFile, AFirstLineMayNameTheSeparator) {
   EXPECT_THAT(ReadText("sep=;\nx;y;z\n1;2;3\n", PointFormat::kCsv).xyz(), ElementsAre(1, 2, 3));
 }
@@ -495,6 +513,8 @@ TEST(PlyFile, AsciiFilesThatContradictTheirHeaderAreErrors) {
   EXPECT_THAT(error("element vertex 1\nproperty float x\nelement vertex 1\n", "1 1 2 3\n"),
               HasSubstr("declares the element vertex twice"));
   EXPECT_EQ(error("element vertex 0\n", ""), "FILE: contains no points");
+  EXPECT_EQ(error("format binary_little_endian 1.0\nelement vertex 1\n", "1 2 3\n"),
+            "FILE:3: the header has the line \"format\" twice");
 }
 
 TEST(PlyFile, FilesTruncatedWithinTheirFacesAreErrors) {
@@ -542,6 +562,11 @@ TEST(PcdFile, AsciiErrorsNameFileAndLine) {
       ReadText("FIELDS x y\nSIZE 4 4\nTYPE F F\nPOINTS 1\nDATA ascii\n1 2\n", PointFormat::kPcd)
           .error(),
       "FILE:5: FIELDS must name x, y and z");
+  // The second line would exchange the coordinates.
+  EXPECT_EQ(
+      ReadText("FIELDS x y z\nCOLUMNS z y x\nPOINTS 1\nDATA ascii\n1 2 3\n", PointFormat::kPcd)
+          .error(),
+      "FILE:2: the header has \"COLUMNS\" twice");
 }
 
 TEST(Formats, AreRecognizedByExtensionInAnyCase) {
