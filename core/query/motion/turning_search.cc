@@ -510,8 +510,9 @@ absl::StatusOr<FirstContact> TurningSearch::ConcludeStuck() {
     if (*tolerable == 1) return WithoutContact(Relation::kWithinTolerance);
   }
   return absl::InvalidArgumentError(
-      "no separation can be proven between the poses: a rotation nearly vanishes, or sizes are out "
-      "of range; add a pose between them");
+      "no separation can be proven between pose and end_pose: a rotation nearly vanishes (add a pose "
+      "between them), or coordinates or translations exceed 2^900 or are all below 2^-700 (rescale "
+      "them)");
 }
 
 // Returns a time of contact, an early one if that is cheap to find. Returns a time above 1 if none
