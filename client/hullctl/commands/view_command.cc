@@ -225,7 +225,7 @@ class Viewing {
   // other server receives its vertices with each query.
   absl::Status AddFile(const std::string& path, ViewScene* scene) {
     HULLD_ASSIGN_OR_RETURN(auto shape, ReadShape(path));
-    ViewObject object{shape.name, "", static_cast<int>(scene->files.size()), kIdentityPose};
+    ViewObject object{shape.name, "", static_cast<int>(scene->files.size()), kNoMotion};
     const absl::Status hull = run_.local ? RegisterHull(path, &object) : BuildHull(path, &shape);
     if (!hull.ok()) {
       run_.err << "hullctl: warning: " << path << " is shown without its hull\n";

@@ -93,18 +93,18 @@ void PrintCoverageJson(const Invocation& run, const TriangleMesh& mesh, const Co
   object.AddJson("enclosed", coverage.uncovered.empty() ? "true" : "false")
       .Add("triangles", uint64_t{mesh.triangles.size()})
       .Add("outside", uint64_t{coverage.uncovered.size()});
-  std::string list = "[";
+  std::vector<std::string> outside;
   for (const UncoveredTriangle& found : coverage.uncovered) {
-    JsonObject one;
-    one.Add("triangle", uint64_t{found.triangle})
-        .AddJson("distance", ShortestText(found.distance))
-        .AddJson("area", ShortestText(found.area))
-        .AddJson("point",
-                 absl::StrCat("[", ShortestText(found.point[0]), ",", ShortestText(found.point[1]),
-                              ",", ShortestText(found.point[2]), "]"));
-    absl::StrAppend(&list, list.size() > 1 ? "," : "", one.Close());
+    outside.push_back(
+        JsonObject()
+            .Add("triangle", uint64_t{found.triangle})
+            .AddJson("distance", ShortestText(found.distance))
+            .AddJson("area", ShortestText(found.area))
+            .AddJson("point", JsonArray({ShortestText(found.point[0]), ShortestText(found.point[1]),
+                                         ShortestText(found.point[2])}))
+            .Close());
   }
-  run.out << object.AddJson("trianglesOutside", list + "]").Close() << "\n";
+  run.out << object.AddJson("trianglesOutside", JsonArray(outside)).Close() << "\n";
 }
 
 void PrintCoverage(const Invocation& run, const CoverArguments& arguments, const TriangleMesh& mesh,

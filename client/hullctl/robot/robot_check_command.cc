@@ -154,7 +154,7 @@ absl::Status RobotCheck::AddScene() {
     around_.hulls.push_back(*scene_.HullOf(i));
     const v1::Placement placement = scene_.PlacementOf(i);
     around_.radii.push_back(placement.radius());
-    const Pose7 pose = NumbersOf(placement.pose());
+    const RigidPose pose = NumbersOf(placement.pose());
     around_.poses.insert(around_.poses.end(), pose.begin(), pose.end());
   }
   return absl::OkStatus();
