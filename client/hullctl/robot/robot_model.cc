@@ -116,17 +116,6 @@ void WarnOfSwollenPart(const Invocation& run, const RobotPart& part, const HullM
              "decomposition of the mesh, or --split\n";
 }
 
-absl::Status RegisterPart(const Client& client, const RobotPart& part, const std::string& id) {
-  v1::ReplaceOpen open;
-  open.set_hull_id(id);
-  open.set_create_if_absent(true);
-  return client
-      .ReplaceHull(
-          open,
-          [&part](const Client::PointSink& sink) { return SendInMessages(part.hull.xyz, sink); })
-      .status();
-}
-
 // Drops repeated points, which are frequent in a list of triangles.
 void KeepDistinctPoints(std::vector<double>* xyz) {
   std::set<std::array<double, 3>> known;
@@ -138,32 +127,13 @@ void KeepDistinctPoints(std::vector<double>* xyz) {
   xyz->resize(kept);
 }
 
-// A private server, started by the first hull that needs it.
-class HullBuilder {
- public:
-  absl::StatusOr<HullMesh> Build(const RobotPart& part) {
-    if (!client_.has_value()) {
-      HULLD_ASSIGN_OR_RETURN(server_, LocalServer::Start());
-      ClientOptions options;
-      options.server = server_->address();
-      options.own_connection = true;
-      client_.emplace(std::move(options));
-    }
-    HULLD_RETURN_IF_ERROR(RegisterPart(*client_, part, "part"));
-    return client_->GetHullMesh("part");
-  }
-
- private:
-  std::unique_ptr<LocalServer> server_;
-  std::optional<Client> client_;
-};
-
 // Turns the hull of a mesh into an inline shape.
 absl::Status ReduceToVertices(const Invocation& run, HullBuilder* builder, RobotPart* part) {
   KeepDistinctPoints(&part->hull.xyz);
   const bool is_small = part->hull.xyz.size() <= 3 * kMaxShapePoints;
   if (is_small && part->mesh.triangles.empty()) return absl::OkStatus();
-  const auto hull = builder->Build(*part);
+  const auto hull = builder->Build(
+      [part](const Client::PointSink& sink) { return SendInMessages(part->hull.xyz, sink); });
   if (!hull.ok()) {
     if (is_small) return absl::OkStatus();
     return absl::Status(hull.status().code(),
@@ -246,7 +216,7 @@ absl::Status PrepareHulls(const Invocation& run, const RobotArguments& arguments
   for (RobotPart& part : model->parts) {
     if (registers) {
       part.hull_id = arguments.prefix + UniqueHullSegment(part.name, &taken);
-      HULLD_RETURN_IF_ERROR(RegisterPart(client, part, part.hull_id));
+      HULLD_RETURN_IF_ERROR(client.PutHull(part.hull_id, part.hull.xyz));
       // Failure to read the hull does not fail the check; the mesh is only compared.
       const auto hull = part.mesh.triangles.empty() ? HullMesh() : client.GetHullMesh(part.hull_id);
       if (hull.ok()) WarnOfSwollenPart(run, part, *hull);

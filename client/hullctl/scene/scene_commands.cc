@@ -115,7 +115,7 @@ class SceneSync {
       const HullDefinition& hull = scene_.hulls[i];
       const absl::Status taken = Take({hull.hull_id, false, {}}, hulls[i], changes, [&] {
         const auto xyz = PointsOf(hull);
-        return xyz.ok() ? PutHull(client_, hull.hull_id, *xyz) : xyz.status();
+        return xyz.ok() ? client_.PutHull(hull.hull_id, *xyz) : xyz.status();
       });
       if (!taken.ok()) return run_.Fail(taken);
     }
