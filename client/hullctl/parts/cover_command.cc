@@ -184,7 +184,7 @@ void AddCoverCommand(Command program, Invocation* invocation) {
   command.AddNumber(
       "--limit", 0, kAnyNumber,
       absl::StrCat("Triangles to list, the farthest first (default ", kDefaultLimit, ")"),
-      [arguments](uint64_t number) { arguments->limit = number; });
+      &arguments->limit);
   command.SetDetails(
       "Checks that each point of each triangle of the mesh is in one of the hulls, boundaries\n"
       "included. A body stands for its pieces at their exact poses. The decision is exact:\n"
@@ -197,8 +197,7 @@ void AddCoverCommand(Command program, Invocation* invocation) {
   command.SetExamples({{"", "hullctl cover bracket bracket.stl"},
                        {"The pieces of a body together", "hullctl cover chair chair.obj"},
                        {"All hulls with a prefix", "hullctl cover chair/ chair.obj"}});
-  command.OnGiven(
-      [=] { invocation->action = [=] { return AnswerCover(*invocation, *arguments); }; });
+  OnGiven(command, invocation, arguments, AnswerCover);
 }
 
 }  // namespace hulld

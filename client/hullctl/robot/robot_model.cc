@@ -16,7 +16,6 @@
 #include "client/hullctl/local/file_shape.h"
 #include "client/hullctl/local/local_server.h"
 #include "client/hullctl/parts/volume_comparison.h"
-#include "client/hullctl/robot/mesh_pieces.h"
 #include "client/point_messages.h"
 #include "client/robot/package_path.h"
 #include "client/robot/urdf_file.h"
@@ -59,13 +58,6 @@ absl::StatusOr<PackagePaths> PathsOf(const RobotArguments& arguments) {
   return paths;
 }
 
-MeshSplit SplitOf(const RobotArguments& arguments) {
-  return arguments.split == "names"        ? MeshSplit::kNames
-         : arguments.split == "components" ? MeshSplit::kComponents
-         : arguments.split == "none"       ? MeshSplit::kNone
-                                           : MeshSplit::kAutomatic;
-}
-
 absl::StatusOr<std::vector<MeshPiece>> ShapePieces(const CollisionShape& shape,
                                                    const PackagePaths& paths, MeshSplit split) {
   if (shape.kind != ShapeKind::kMesh) return std::vector<MeshPiece>{{PrimitiveHull(shape), {}}};
@@ -79,7 +71,7 @@ absl::Status AddLink(const RobotArguments& arguments, const PackagePaths& paths,
   const RobotLink& from = model->robot.links[link];
   const size_t first = model->parts.size();
   for (const CollisionShape& shape : from.shapes) {
-    auto pieces = ShapePieces(shape, paths, SplitOf(arguments));
+    auto pieces = ShapePieces(shape, paths, arguments.split);
     if (!pieces.ok()) {
       const std::string message(pieces.status().message().data(), pieces.status().message().size());
       return absl::Status(pieces.status().code(),
@@ -161,11 +153,14 @@ void AddRobotArguments(Command command, RobotArguments* arguments) {
   command.AddRepeated("--package", &arguments->packages, "Folder of a package; repeatable")
       .ValueName("NAME=DIR");
   command
-      .AddText("--split", &arguments->split,
-               "Split meshes into parts: by names in the file, or by connected components; none: "
-               "one hull per mesh (default: by names, if all parts are convex)")
-      .ValueName("HOW")
-      .OneOf({"names", "components", "none"});
+      .AddChoice("--split",
+                 {{"names", MeshSplit::kNames},
+                  {"components", MeshSplit::kComponents},
+                  {"none", MeshSplit::kNone}},
+                 &arguments->split,
+                 "Split meshes into parts: by names in the file, or by connected components; none: "
+                 "one hull per mesh (default: by names, if all parts are convex)")
+      .ValueName("HOW");
   command
       .AddText("--prefix", &arguments->prefix,
                "Keep the hulls of the links under this prefix, such as arm/ (default: store none)")
