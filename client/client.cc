@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "client/calls/grpc_status.h"
+#include "client/point_messages.h"
 #include "client/server_address.h"
 #include "client/status_macros.h"
 
@@ -191,7 +192,7 @@ absl::StatusOr<std::unique_ptr<Appender>> Client::OpenAppend(const std::string& 
 }
 
 absl::StatusOr<v1::ReplaceHullResponse> Client::ReplaceHull(
-    const v1::ReplaceOpen& open, const std::function<absl::Status(const PointSink&)>& feed,
+    const v1::ReplaceOpen& open, const PointFeed& feed,
     std::optional<std::chrono::milliseconds> timeout) const {
   grpc::ClientContext context;
   if (timeout.has_value()) context.set_deadline(std::chrono::system_clock::now() + *timeout);
@@ -218,6 +219,17 @@ absl::StatusOr<v1::ReplaceHullResponse> Client::ReplaceHull(
   if (!fed.ok() && writable) return fed;
   if (!status.ok()) return status;
   return response;
+}
+
+absl::Status Client::PutHull(const std::string& hull_id, const PointFeed& feed) const {
+  v1::ReplaceOpen open;
+  open.set_hull_id(hull_id);
+  open.set_create_if_absent(true);
+  return ReplaceHull(open, feed).status();
+}
+
+absl::Status Client::PutHull(const std::string& hull_id, std::span<const double> xyz) const {
+  return PutHull(hull_id, [xyz](const PointSink& sink) { return SendInMessages(xyz, sink); });
 }
 
 absl::Status Client::SaveBackup(

@@ -10,6 +10,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -37,7 +38,7 @@ struct ClientOptions {
   // bounds the wait for the next acknowledgement.
   std::chrono::milliseconds timeout{30000};
   RetryPolicy retry;
-  // Freshness of reads whose request does not set one (proto/hulld/v1/freshness.proto). Defaults to
+  // Freshness of reads that do not set one (proto/hulld/v1/freshness.proto). Defaults to
   // linearizable. Later pages of a list never have a lower revision than earlier ones.
   std::optional<v1::Freshness> freshness;
   // Opens a separate connection. By default, all clients in a process share one connection per
@@ -85,9 +86,14 @@ class Client {
   // to the number of points, so options.timeout does not apply; `timeout`, if given, bounds the
   // whole call.
   using PointSink = std::function<absl::Status(const v1::PointBlock&)>;
+  using PointFeed = std::function<absl::Status(const PointSink&)>;
   absl::StatusOr<v1::ReplaceHullResponse> ReplaceHull(
-      const v1::ReplaceOpen& open, const std::function<absl::Status(const PointSink&)>& feed,
+      const v1::ReplaceOpen& open, const PointFeed& feed,
       std::optional<std::chrono::milliseconds> timeout = {}) const;
+  // Same as above; creates the hull if it does not exist.
+  absl::Status PutHull(const std::string& hull_id, const PointFeed& feed) const;
+  // xyz: n x 3.
+  absl::Status PutHull(const std::string& hull_id, std::span<const double> xyz) const;
 
   // Passes each part of a backup of the store to `receive`, in order. An error from `receive` ends
   // the call and is returned. Not retried; `timeout` as above.

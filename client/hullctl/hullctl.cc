@@ -29,18 +29,13 @@ namespace {
 
 void AddOutputOptions(Command program, Invocation* invocation) {
   program
-      .AddParsed(
-          "--output",
-          [invocation](const std::string& form) {
-            invocation->form = form == "json"   ? OutputForm::kJson
-                               : form == "name" ? OutputForm::kName
-                               : form == "wide" ? OutputForm::kWide
-                                                : OutputForm::kTable;
-            return absl::OkStatus();
-          },
-          "Format of answers (default table)")
-      .ValueName("FORM")
-      .OneOf({"table", "wide", "name", "json"});
+      .AddChoice("--output",
+                 {{"table", OutputForm::kTable},
+                  {"wide", OutputForm::kWide},
+                  {"name", OutputForm::kName},
+                  {"json", OutputForm::kJson}},
+                 &invocation->form, "Format of answers (default table)")
+      .ValueName("FORM");
   program
       .AddParsed(
           "--color",
@@ -58,14 +53,7 @@ void AddGlobalOptions(Command program, Invocation* invocation) {
   AddConnectionOptions(program, invocation);
   program
       .AddParsed(
-          "--timeout",
-          [invocation](const std::string& text) {
-            const auto timeout = ParseDuration(text);
-            if (!timeout.ok()) return timeout.status();
-            invocation->timeout = *timeout;
-            invocation->given_timeout = *timeout;
-            return absl::OkStatus();
-          },
+          "--timeout", ParseDuration, &invocation->given_timeout,
           "Time to wait for an answer, such as 500ms or 2m (default 30s; none for 'replace' and "
           "'backup save'). An unreachable server is retried during this time; by default, for less "
           "than a second")

@@ -117,12 +117,6 @@ ExitCode DeleteBody(const Invocation& run, const BodyArguments& arguments) {
 }
 
 using Arguments = std::shared_ptr<BodyArguments>;
-using BodyAction = ExitCode (*)(const Invocation& run, const BodyArguments& arguments);
-
-void OnGiven(Command command, Invocation* invocation, const Arguments& arguments, BodyAction act) {
-  command.OnGiven([=] { invocation->action = [=] { return act(*invocation, *arguments); }; });
-}
-
 void AddName(Command command, const Arguments& arguments) {
   command.AddText("ID", &arguments->body_id, "ID of the body")
       .Required()
@@ -130,8 +124,7 @@ void AddName(Command command, const Arguments& arguments) {
 }
 
 void AddIfRevision(Command command, const Arguments& arguments, const std::string& help) {
-  command.AddNumber("--if-revision", 0, kAnyNumber, help,
-                    [arguments](uint64_t number) { arguments->if_revision = number; });
+  command.AddNumber("--if-revision", 0, kAnyNumber, help, &arguments->if_revision);
 }
 
 void AddPut(Command body, Invocation* invocation, const Arguments& arguments) {
@@ -145,8 +138,7 @@ void AddPut(Command body, Invocation* invocation, const Arguments& arguments) {
   put.AddText("--pieces", &arguments->file,
               "JSON file of pieces, as 'body get --output json' writes it, instead of HULL; - "
               "is standard input")
-      .ValueName("FILE")
-      .Completes(ValueKind::kFile);
+      .ValueName("FILE");
   AddIfRevision(put, arguments,
                 "Only if the body is at this revision; 0: only if it does not exist");
   put.SetExamples(
@@ -178,8 +170,7 @@ void AddBodyCommand(Command program, Invocation* invocation) {
   Command list = body.AddCommand("list", "List the bodies");
   list.AddText("PREFIX", &arguments->prefix, "Only IDs with this prefix")
       .Completes(ValueKind::kBody);
-  list.AddNumber("--limit", 1, 1000000000, "Stop after N bodies (default: all)",
-                 [arguments](uint64_t number) { arguments->limit = number; });
+  list.AddNumber("--limit", 1, 1000000000, "Stop after N bodies (default: all)", &arguments->limit);
   AddFreshnessOptions(list, invocation);
   list.SetExamples({{"", "hullctl body list cell-3/"}});
   OnGiven(list, invocation, arguments, ListBodies);

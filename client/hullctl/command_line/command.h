@@ -10,6 +10,7 @@
 #include <optional>
 #include <ostream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "client/hullctl/command_line/exit_code.h"
@@ -73,12 +74,46 @@ class Command {
   // Adds an option with a custom parser; the message of its error is shown after the option's name.
   Option AddParsed(const std::string& name, std::function<absl::Status(const std::string&)> parse,
                    const std::string& help);
+  // Likewise; `parse` returns an absl::StatusOr with the value.
+  template <typename Parse, typename T>
+  Option AddParsed(const std::string& name, Parse parse, T* value, const std::string& help) {
+    const auto take = [=](const std::string& text) {
+      auto parsed = parse(text);
+      if (parsed.ok()) *value = *std::move(parsed);
+      return parsed.status();
+    };
+    return AddParsed(name, take, help);
+  }
+  // Adds an option for one of several named values.
+  template <typename T>
+  Option AddChoice(const std::string& name, const std::vector<std::pair<const char*, T>>& choices,
+                   T* value, const std::string& help) {
+    std::vector<std::string> names;
+    for (const auto& [choice, meaning] : choices) names.emplace_back(choice);
+    const auto take = [=](const std::string& text) {
+      for (const auto& [choice, meaning] : choices) {
+        if (text == choice) *value = meaning;
+      }
+      return absl::OkStatus();
+    };
+    return AddParsed(name, take, help).OneOf(names);
+  }
   // Adds an option for a decimal integer from `least` to `most`. (CLI11 itself reads 010 as eight.)
   Option AddNumber(const std::string& name, uint64_t least, uint64_t most, const std::string& help,
                    std::function<void(uint64_t)> take);
+  template <typename T>
+  Option AddNumber(const std::string& name, uint64_t least, uint64_t most, const std::string& help,
+                   T* value) {
+    return AddNumber(name, least, most, help,
+                     [value](uint64_t number) { *value = static_cast<T>(number); });
+  }
   // Adds an option for a finite length of at least 0.
   Option AddLength(const std::string& name, const std::string& help,
                    std::function<void(double)> take);
+  template <typename T>
+  Option AddLength(const std::string& name, const std::string& help, T* value) {
+    return AddLength(name, help, [value](double length) { *value = length; });
+  }
   Option AddFlag(const std::string& name, bool* value, const std::string& help);
   Option AddFlag(const std::string& name, std::function<void()> set, const std::string& help);
 

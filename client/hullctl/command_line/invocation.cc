@@ -80,7 +80,7 @@ std::string Explain(const absl::Status& status, const std::string& server,
 Client Invocation::MakeClient() const {
   ClientOptions options;
   options.server = server;
-  options.timeout = timeout;
+  options.timeout = timeout();
   // Without --timeout, an unreachable server is reported within a second.
   if (!given_timeout.has_value()) options.retry.max_attempts = 4;
   options.security = security;
@@ -96,7 +96,7 @@ bool Invocation::PrintForPrograms(const google::protobuf::Message& message,
 }
 
 ExitCode Invocation::Fail(const absl::Status& status) const {
-  err << "hullctl: " << Explain(status, server, timeout, security) << "\n";
+  err << "hullctl: " << Explain(status, server, timeout(), security) << "\n";
   const bool unreachable = absl::IsUnavailable(status) || absl::IsDeadlineExceeded(status);
   return unreachable ? ExitCode::kUnreachable : ExitCode::kRequestFailed;
 }

@@ -6,12 +6,15 @@
 
 #include <functional>
 #include <map>
+#include <memory>
 #include <optional>
 #include <ostream>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "client/client.h"
+#include "client/hullctl/command_line/command.h"
 #include "client/hullctl/command_line/exit_code.h"
 #include "client/hullctl/context/connection_settings.h"
 #include "client/hullctl/help/command_description.h"
@@ -54,7 +57,6 @@ struct Invocation {
   std::string server = kDefaultServer;
   ConnectionSecurity security;
 
-  std::chrono::milliseconds timeout{30000};
   // The value of --timeout, if given. Also bounds calls with a duration proportional to the data.
   std::optional<std::chrono::milliseconds> given_timeout;
   // Freshness of reads, if set by options.
@@ -70,6 +72,9 @@ struct Invocation {
   // Set by the given command.
   std::function<ExitCode()> action;
 
+  std::chrono::milliseconds timeout() const {
+    return given_timeout.value_or(std::chrono::seconds(30));
+  }
   bool json() const { return form == OutputForm::kJson; }
   bool names() const { return form == OutputForm::kName; }
   bool wide() const { return form == OutputForm::kWide; }
@@ -88,6 +93,26 @@ struct Invocation {
   // Reports why a certificate is not valid; returns the exit code for the verdict.
   ExitCode Judge(const Verification& verification) const;
 };
+
+// Makes `action` the action of the invocation if the command is given.
+inline void OnGiven(Command command, Invocation* invocation, ExitCode (*action)(const Invocation&),
+                    bool needs_server = true) {
+  command.OnGiven([=] {
+    invocation->needs_server = needs_server;
+    invocation->action = [=] { return action(*invocation); };
+  });
+}
+
+// Likewise, with arguments.
+template <typename Arguments>
+void OnGiven(Command command, Invocation* invocation, std::shared_ptr<Arguments> arguments,
+             std::type_identity_t<ExitCode (*)(const Invocation&, const Arguments&)> action,
+             bool needs_server = true) {
+  command.OnGiven([=] {
+    invocation->needs_server = needs_server;
+    invocation->action = [=] { return action(*invocation, *arguments); };
+  });
+}
 
 }  // namespace hulld
 

@@ -22,8 +22,7 @@ void AddPointInput(Command command, PointInput* input) {
       .ValueName("FORMAT")
       .OneOf(PointFormatNames());
   command.AddNumber("--chunk-points", 1, uint64_t{100} << 20,
-                    "Points per message (default: about 1 MiB)",
-                    [input](uint64_t number) { input->chunk_points = number; });
+                    "Points per message (default: about 1 MiB)", &input->chunk_points);
 }
 
 std::vector<std::string> SkippedTexts(const ReadCounts& counts) {

@@ -2,11 +2,6 @@
 
 namespace hulld {
 
-void QueryDetails::Apply(v1::Wanted* file_wanted, double* file_tolerance) const {
-  file_wanted->MergeFrom(wanted);
-  if (tolerance.has_value()) *file_tolerance = *tolerance;
-}
-
 void AddWantedOptions(Command command, QueryDetails* details) {
   v1::Wanted* const wanted = &details->wanted;
   command.AddFlag(
@@ -37,7 +32,7 @@ void AddWantedOptions(Command command, QueryDetails* details) {
   command.AddLength(
       "--tolerance",
       "Allow the answer WITHIN_TOLERANCE for separations up to this, for speed (default 0: exact)",
-      [details](double length) { details->tolerance = length; });
+      &details->tolerance);
 }
 
 void AddQueryOptions(Command command, QueryDetails* details) {

@@ -16,8 +16,12 @@ struct QueryDetails {
   // Checks each answer's certificate; implies a request for it.
   bool verify = false;
 
-  // Overrides the requests of a file.
-  void Apply(v1::Wanted* file_wanted, double* file_tolerance) const;
+  // Overrides `wanted` and `tolerance` of a request.
+  template <typename Request>
+  void Apply(Request* request) const {
+    request->mutable_wanted()->MergeFrom(wanted);
+    if (tolerance.has_value()) request->set_tolerance(*tolerance);
+  }
 };
 
 // Declares --axis, --report, --certificate, --separation, --max-error, --witness, --normal,

@@ -19,8 +19,7 @@ struct AppendArguments {
   bool create = false;
   bool resume = false;
   std::string writer;
-  // Empty, "names", or "components".
-  std::string split;
+  std::optional<SplitBy> split;
 };
 
 // Appends files to one hull. The stream opens, and --create creates the hull, when the first points
@@ -230,12 +229,11 @@ ExitCode SplitAppend(const Invocation& run, const AppendArguments& arguments) {
     return run.FailUsage(
         "--split can be combined only with --create; the format follows from the file name");
   }
-  const SplitBy split = arguments.split == "names" ? SplitBy::kName : SplitBy::kComponent;
-  return AppendParts(run, arguments.hull_id, input.files, split, arguments.create);
+  return AppendParts(run, arguments.hull_id, input.files, *arguments.split, arguments.create);
 }
 
 ExitCode AppendFiles(const Invocation& run, const AppendArguments& arguments) {
-  if (!arguments.split.empty()) return SplitAppend(run, arguments);
+  if (arguments.split.has_value()) return SplitAppend(run, arguments);
   uint64_t total_bytes = 0;
   auto plan = PlanReads(arguments.input, &total_bytes);
   if (!plan.ok()) return run.FailUsage(plan.status());
@@ -282,12 +280,13 @@ void AddAppendCommand(Command program, Invocation* invocation) {
                "Resume an interrupted command: skip the chunks that this writer has committed")
       .Needs(writer);
   command
-      .AddText("--split", &arguments->split,
-               "Append each part to a hull of its own, ID/PART, and combine them as the body ID. "
-               "Parts are named in the file (objects and groups of obj, solids of stl, nodes of "
-               "gltf and dae), or are connected components")
-      .ValueName("HOW")
-      .OneOf({"names", "components"});
+      .AddChoice<std::optional<SplitBy>>(
+          "--split", {{"names", SplitBy::kName}, {"components", SplitBy::kComponent}},
+          &arguments->split,
+          "Append each part to a hull of its own, ID/PART, and combine them as the body ID. Parts "
+          "are named in the file (objects and groups of obj, solids of stl, nodes of gltf and "
+          "dae), or are connected components")
+      .ValueName("HOW");
   command.SetDetails(
       "Formats: obj, off, ply, xyz, csv, pcd, pts (text becomes the nearest double), las, stl,\n"
       "gltf, dae.\n"
@@ -305,8 +304,7 @@ void AddAppendCommand(Command program, Invocation* invocation) {
                        {"", "hullctl append ball ball.xyz --writer lab --resume"},
                        {"Each object of a file as chair/OBJECT, and all as the body chair",
                         "hullctl append chair chair.obj --split names --create"}});
-  command.OnGiven(
-      [=] { invocation->action = [=] { return AppendFiles(*invocation, *arguments); }; });
+  OnGiven(command, invocation, arguments, AppendFiles);
 }
 
 }  // namespace hulld

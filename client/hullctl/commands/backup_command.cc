@@ -81,7 +81,7 @@ void AddBackupCommand(Command program, Invocation* invocation) {
   save.SetDetails(
       "Runs without a time limit unless --timeout is given. A failed backup leaves no file.");
   save.SetExamples({{"", "hullctl backup save hulls.backup"}});
-  save.OnGiven([=] { invocation->action = [=] { return Save(*invocation, *arguments); }; });
+  OnGiven(save, invocation, arguments, Save);
   Command restore =
       command.AddCommand("restore", "Create a data directory from a backup, for a new hulld");
   restore.AddText("FILE", &arguments->file, "File of 'backup save'").Required();
@@ -91,10 +91,7 @@ void AddBackupCommand(Command program, Invocation* invocation) {
       .Required();
   restore.SetExamples({{"", "hullctl backup restore hulls.backup --data-dir restored"},
                        {"", "hulld --data-dir restored"}});
-  restore.OnGiven([=] {
-    invocation->needs_server = false;
-    invocation->action = [=] { return Restore(*invocation, *arguments); };
-  });
+  OnGiven(restore, invocation, arguments, Restore, /*needs_server=*/false);
 }
 
 }  // namespace hulld

@@ -40,11 +40,9 @@ class BatchRun {
         client_(run.MakeClient()),
         checker_(client_),
         bar_(run.err, run.shows_progress, "pairs", pairs.size() / 2) {
-    v1::Wanted wanted = scene.request.wanted();
-    tolerance_ = scene.request.tolerance();
-    arguments.details.Apply(&wanted, &tolerance_);
-    base_.set_tolerance(tolerance_);
-    *base_.mutable_wanted() = std::move(wanted);
+    *base_.mutable_wanted() = scene.request.wanted();
+    base_.set_tolerance(scene.request.tolerance());
+    arguments.details.Apply(&base_);
     const bool textbook = arguments.details.method != v1::METHOD_UNSPECIFIED;
     base_.set_method(textbook ? arguments.details.method : scene.method);
     if (!run.json()) return;
@@ -145,7 +143,7 @@ class BatchRun {
     for (const size_t side : {2 * pair, 2 * pair + 1}) {
       const auto found = problems_.find(request_->pairs(static_cast<int>(side)));
       if (found == problems_.end()) continue;
-      return scene_.ProblemText(*scene_.HullOf(pairs_[2 * first_ + side]), found->second);
+      return scene_.ProblemText(pairs_[2 * first_ + side], found->second);
     }
     return scene_.InKeys(message);
   }
@@ -259,7 +257,7 @@ class BatchRun {
                                               {"failed", v1::RELATION_UNSPECIFIED}};
   // With a tolerance of 0, no pair is within it.
   bool IsSummed(const SummaryEntry& entry) const {
-    return entry.relation != v1::RELATION_WITHIN_TOLERANCE || tolerance_ > 0;
+    return entry.relation != v1::RELATION_WITHIN_TOLERANCE || base_.tolerance() > 0;
   }
 
   const Invocation& run_;
@@ -271,7 +269,6 @@ class BatchRun {
   ProgressBar bar_;
   // Fields common to all calls.
   v1::BatchCheckCollisionsRequest base_;
-  double tolerance_ = 0;
   // Header and hulls of the current call.
   v1::BatchCheckCollisionsResponse head_;
   // Hulls of the pieces of bodies, and their index by ID.
@@ -340,7 +337,7 @@ void AddBatchCommand(Command program, Invocation* invocation) {
        {"Only colliding pairs, with verified certificates",
         "hullctl batch scene.yaml --colliding --verify"},
        {"As messages of the contract, one per line", "hullctl batch scene.yaml --output json"}});
-  command.OnGiven([=] { invocation->action = [=] { return Batch(*invocation, *arguments); }; });
+  OnGiven(command, invocation, arguments, Batch);
 }
 
 }  // namespace hulld

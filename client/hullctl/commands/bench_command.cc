@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <map>
 #include <memory>
 #include <random>
 #include <utility>
+#include <vector>
 
 #include "client/formats/text_number.h"
 #include "client/hullctl/command_line/arguments.h"
@@ -33,14 +33,11 @@ struct LoadArguments {
   LoadPlan plan;
 };
 
-const std::map<std::string, LoadMode>& ModeNames() {
-  static const auto* const kNames =
-      new std::map<std::string, LoadMode>{{"check", LoadMode::kCheck},
-                                          {"batch", LoadMode::kBatch},
-                                          {"append", LoadMode::kAppend},
-                                          {"mixed", LoadMode::kMixed}};
-  return *kNames;
-}
+using NamedMode = std::pair<const char*, LoadMode>;
+constexpr NamedMode kModes[] = {{"check", LoadMode::kCheck},
+                                {"batch", LoadMode::kBatch},
+                                {"append", LoadMode::kAppend},
+                                {"mixed", LoadMode::kMixed}};
 
 // Returns the name of an item of a request.
 const char* ItemName(LoadMode mode) {
@@ -127,8 +124,8 @@ void PrintLoadTable(const LoadArguments& arguments, const LoadResult& result, st
 
 std::string Number(double value) { return ShortestText(value); }
 
-void PrintLoadJson(const LoadArguments& arguments, const std::string& mode, bool interrupted,
-                   const LoadResult& result, std::ostream& out) {
+void PrintLoadJson(const LoadArguments& arguments, bool interrupted, const LoadResult& result,
+                   std::ostream& out) {
   const double seconds = Seconds(result.elapsed);
   JsonObject latency;
   for (size_t i = 0; i < std::size(kPercentiles); ++i) {
@@ -154,7 +151,8 @@ void PrintLoadJson(const LoadArguments& arguments, const std::string& mode, bool
   }
   const auto succeeded = static_cast<double>(result.latencies.count());
   out << JsonObject()
-             .Add("mode", mode)
+             .Add("mode",
+                  std::ranges::find(kModes, arguments.settings.mode, &NamedMode::second)->first)
              .Add("clients", static_cast<uint64_t>(arguments.settings.clients))
              .AddJson("ratePerSecond", arguments.plan.rate ? Number(*arguments.plan.rate) : "null")
              .AddJson("interrupted", interrupted ? "true" : "false")
@@ -171,13 +169,6 @@ void PrintLoadJson(const LoadArguments& arguments, const std::string& mode, bool
              .AddJson("errors", JsonArray(failures))
              .Close()
       << "\n";
-}
-
-std::string ModeName(LoadMode mode) {
-  for (const auto& [name, value] : ModeNames()) {
-    if (value == mode) return name;
-  }
-  return "";
 }
 
 LoadResult Drive(const Invocation& run, const LoadArguments& arguments,
@@ -201,7 +192,8 @@ ExitCode LoadExitCode(const LoadResult& result) {
   return unreachable ? ExitCode::kUnreachable : ExitCode::kRequestFailed;
 }
 
-ExitCode Load(const Invocation& run, LoadArguments arguments) {
+ExitCode Load(const Invocation& run, const LoadArguments& given) {
+  LoadArguments arguments = given;
   // Recorded, so that the hulls can be deleted.
   std::atomic<bool> interrupted = false;
   const Interrupt interrupt([&interrupted] { interrupted = true; });
@@ -220,7 +212,7 @@ ExitCode Load(const Invocation& run, LoadArguments arguments) {
   if (created.ok()) result = Drive(run, arguments, interrupted, &subjects);
   const absl::Status deleted = subjects.Delete();
   if (created.ok() && run.json()) {
-    PrintLoadJson(arguments, ModeName(arguments.settings.mode), interrupted, result, run.out);
+    PrintLoadJson(arguments, interrupted, result, run.out);
   } else if (created.ok()) {
     PrintLoadTable(arguments, result, run.out);
   }
@@ -236,56 +228,39 @@ ExitCode Load(const Invocation& run, LoadArguments arguments) {
 
 void AddPlanOptions(Command command, LoadPlan* plan) {
   command
-      .AddParsed(
-          "--duration",
-          [plan](const std::string& text) {
-            const auto duration = ParseDuration(text);
-            if (duration.ok()) plan->duration = *duration;
-            return duration.status();
-          },
-          "Duration, such as 30s (default 10s, unless --requests is given)")
+      .AddParsed("--duration", ParseDuration, &plan->duration,
+                 "Duration, such as 30s (default 10s, unless --requests is given)")
       .ValueName("TIME");
   command.AddNumber("--requests", 1, uint64_t{1} << 40, "Total number of requests of all clients",
-                    [plan](uint64_t number) { plan->requests = number; });
+                    &plan->requests);
   command
       .AddParsed(
           "--rate",
-          [plan](const std::string& text) {
+          [](const std::string& text) -> absl::StatusOr<double> {
             double rate = 0;
-            if (ParseDouble(text, &rate) != NumberText::kNumber || !(rate >= 0.01 && rate <= 1e7)) {
-              return absl::InvalidArgumentError(
-                  Quoted(text) + " is not a number of requests per second from 0.01 to 1e7");
+            if (ParseDouble(text, &rate) == NumberText::kNumber && rate >= 0.01 && rate <= 1e7) {
+              return rate;
             }
-            plan->rate = rate;
-            return absl::OkStatus();
+            return absl::InvalidArgumentError(
+                Quoted(text) + " is not a number of requests per second from 0.01 to 1e7");
           },
-          "Total requests per second of all clients (default: as fast as possible)")
+          &plan->rate, "Total requests per second of all clients (default: as fast as possible)")
       .ValueName("R");
 }
 
 void AddSettingOptions(Command command, LoadSettings* settings) {
-  std::vector<std::string> names;
-  for (const auto& [name, mode] : ModeNames()) names.push_back(name);
   command
-      .AddParsed(
-          "--mode",
-          [settings](const std::string& name) {
-            settings->mode = ModeNames().at(name);
-            return absl::OkStatus();
-          },
-          "check (default), batch, append, or mixed, in the ratio 8:1:1")
-      .OneOf(names)
+      .AddChoice("--mode", {std::begin(kModes), std::end(kModes)}, &settings->mode,
+                 "check (default), batch, append, or mixed, in the ratio 8:1:1")
       .ValueName("MODE");
   command.AddNumber("--clients", 1, 1000, "Number of clients, each with a connection (default 1)",
-                    [settings](uint64_t number) { settings->clients = static_cast<int>(number); });
-  command.AddNumber("--hulls", 1, 10000, "Number of hulls (default 16)",
-                    [settings](uint64_t number) { settings->hulls = number; });
+                    &settings->clients);
+  command.AddNumber("--hulls", 1, 10000, "Number of hulls (default 16)", &settings->hulls);
   command.AddNumber("--vertices", 1, 100000, "Vertices per hull, on a sphere (default 64)",
-                    [settings](uint64_t number) { settings->vertices = number; });
-  command.AddNumber("--pairs", 1, 1000000, "Pairs per batch (default 10000)",
-                    [settings](uint64_t number) { settings->pairs = number; });
+                    &settings->vertices);
+  command.AddNumber("--pairs", 1, 1000000, "Pairs per batch (default 10000)", &settings->pairs);
   command.AddNumber("--points", 1, 160000, "Points per append, in a ball (default 10000)",
-                    [settings](uint64_t number) { settings->points = number; });
+                    &settings->points);
   command
       .AddText("--prefix", &settings->prefix,
                "Prefix of the hulls to create and delete (default bench-load/RANDOM/)")
@@ -315,7 +290,7 @@ void AddBenchCommand(Command program, Invocation* invocation) {
        {"At a steady rate", "hullctl bench load --rate 500 --mode mixed"},
        {"Several servers over one store; answers may be 200 ms stale",
         "hullctl bench load --clients 64 --max-staleness 200ms"}});
-  load.OnGiven([=] { invocation->action = [=] { return Load(*invocation, *arguments); }; });
+  OnGiven(load, invocation, arguments, Load);
 }
 
 }  // namespace hulld

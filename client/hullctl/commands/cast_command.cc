@@ -208,27 +208,17 @@ ExitCode CastRay(const Invocation& run, const CastArguments& arguments) {
   return ExitCode::kSomeFailed;
 }
 
-void AddTriple(Command command, const std::string& name, Triple* triple, const std::string& help) {
-  command
-      .AddParsed(
-          name,
-          [triple](const std::string& text) {
-            const auto parsed = ParseTriple(text);
-            if (parsed.ok()) *triple = *parsed;
-            return parsed.status();
-          },
-          help)
-      .Required();
-}
-
 }  // namespace
 
 void AddCastCommand(Command program, Invocation* invocation) {
   auto arguments = std::make_shared<CastArguments>();
   Command command = program.AddCommand("cast", "Find the hulls that a ray hits");
-  AddTriple(command, "ORIGIN", &arguments->origin, "Start of the ray, x,y,z");
-  AddTriple(command, "DIRECTION", &arguments->direction,
-            "Vector from the start of the ray to its end, x,y,z");
+  command.AddParsed("ORIGIN", ParseTriple, &arguments->origin, "Start of the ray, x,y,z")
+      .Required();
+  command
+      .AddParsed("DIRECTION", ParseTriple, &arguments->direction,
+                 "Vector from the start of the ray to its end, x,y,z")
+      .Required();
   command.AddText("PREFIX", &arguments->prefix, "Only hulls whose IDs start with this prefix")
       .Completes(ValueKind::kHull);
   AddFreshnessOptions(command, invocation);
@@ -243,7 +233,7 @@ void AddCastCommand(Command program, Invocation* invocation) {
       "hull. Bodies are not searched.");
   command.SetExamples({{"What is below the origin?", "hullctl cast 0,0,0 0,0,-100"},
                        {"", "hullctl cast 0,0,0 100,0,0 robot/ --output name"}});
-  command.OnGiven([=] { invocation->action = [=] { return CastRay(*invocation, *arguments); }; });
+  OnGiven(command, invocation, arguments, CastRay);
 }
 
 }  // namespace hulld

@@ -327,9 +327,7 @@ ExitCode CheckPair(const Invocation& run, const PairArguments& arguments) {
   absl::Status status = SetSide(run, arguments.a, request.mutable_a());
   if (status.ok()) status = SetSide(run, arguments.b, request.mutable_b());
   if (!status.ok()) return run.FailUsage(status);
-  double tolerance = 0;
-  arguments.details.Apply(request.mutable_wanted(), &tolerance);
-  request.set_tolerance(tolerance);
+  arguments.details.Apply(&request);
   request.set_method(arguments.details.method);
   const Client client = run.MakeClient();
   VerifiedResponse answer;
@@ -422,8 +420,7 @@ void AddCheckCommand(Command program, Invocation* invocation) {
       .AddText("--points", &arguments->points,
                "Instead of checking a pair, show which points of a file are inside A, on its "
                "boundary, or outside; - is standard input")
-      .ValueName("FILE")
-      .Completes(ValueKind::kFile);
+      .ValueName("FILE");
   AddQueryOptions(command, &arguments->details);
   AddMotionOptions(command, &arguments->details.wanted);
   AddFreshnessOptions(command, invocation);
@@ -464,7 +461,7 @@ void AddCheckCommand(Command program, Invocation* invocation) {
        {"Prove it", "hullctl check arm box --verify"},
        {"Record the answer, and verify it later", "hullctl check arm box --record answer.json"},
        {"", "hullctl verify answer.json"}});
-  command.OnGiven([=] { invocation->action = [=] { return Check(*invocation, *arguments); }; });
+  OnGiven(command, invocation, arguments, Check);
 }
 
 }  // namespace hulld

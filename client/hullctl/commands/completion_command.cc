@@ -65,10 +65,7 @@ void AddCompletionCommand(Command program, Invocation* invocation) {
   command.SetExamples({{"In ~/.bashrc", "source <(hullctl completion bash)"},
                        {"In ~/.zshrc, after compinit", "source <(hullctl completion zsh)"},
                        {"In ~/.config/fish/config.fish", "hullctl completion fish | source"}});
-  command.OnGiven([=] {
-    invocation->needs_server = false;
-    invocation->action = [=] { return PrintScript(*invocation, *shell); };
-  });
+  OnGiven(command, invocation, shell, PrintScript, /*needs_server=*/false);
 }
 
 void AddManCommand(Command program, Invocation* invocation) {
@@ -76,10 +73,7 @@ void AddManCommand(Command program, Invocation* invocation) {
   Command command = program.AddCommand("__man", "Write the manual pages");
   command.AddText("FOLDER", folder.get(), "Directory to write to").Required();
   command.Hide();
-  command.OnGiven([=] {
-    invocation->needs_server = false;
-    invocation->action = [=] { return WriteManPages(*invocation, *folder); };
-  });
+  OnGiven(command, invocation, folder, WriteManPages, /*needs_server=*/false);
 }
 
 }  // namespace hulld

@@ -142,7 +142,8 @@ ExitCode Remove(const Invocation& run, const ContextArguments& arguments) {
 }
 
 // Shows the effective settings and their sources.
-ExitCode Show(Invocation run, const ContextArguments& arguments) {
+ExitCode Show(const Invocation& invocation, const ContextArguments& arguments) {
+  Invocation run = invocation;
   if (!arguments.name.empty()) run.context = arguments.name;
   const absl::Status resolved = ResolveConnection(&run);
   // Reports unreadable files after the settings that name them.
@@ -174,12 +175,6 @@ void AddContextCommand(Command program, Invocation* invocation) {
   Command command = program.AddCommand("context", "Manage named servers");
   command.RequireCommand();
   const auto arguments = std::make_shared<ContextArguments>();
-  const auto act = [=](const std::function<ExitCode()>& action) {
-    return [=] {
-      invocation->needs_server = false;
-      invocation->action = action;
-    };
-  };
   command.SetDetails(
       "Contexts are kept in $XDG_CONFIG_HOME/hullctl/contexts.json, by default below ~/.config,\n"
       "with paths of token files, never tokens. Precedence: an option; the context of --context;\n"
@@ -193,24 +188,24 @@ void AddContextCommand(Command program, Invocation* invocation) {
                     "hullctl context add cell-3 --server cell-3.example:50551 --tls "
                     "--token-file cell-3.token"},
                    {"", "hullctl context add here --server 127.0.0.1:50551"}});
-  add.OnGiven(act([=] { return Add(*invocation, *arguments); }));
+  OnGiven(add, invocation, arguments, Add, /*needs_server=*/false);
   Command use = command.AddCommand("use", "Select a context for later commands");
   use.AddText("NAME", &arguments->name, "Name of the context").Completes(ValueKind::kContext);
   use.AddFlag("--none", &arguments->none, "Select no context");
   use.SetExamples({{"", "hullctl context use cell-3"},
                    {"Use another context for a single command", "hullctl list --context here"}});
-  use.OnGiven(act([=] { return Use(*invocation, *arguments); }));
+  OnGiven(use, invocation, arguments, Use, /*needs_server=*/false);
   Command list = command.AddCommand("list", "List the contexts");
-  list.OnGiven(act([=] { return ListContexts(*invocation); }));
+  OnGiven(list, invocation, ListContexts, /*needs_server=*/false);
   Command show = command.AddCommand("show", "Show the settings in force and the source of each");
   show.AddText("NAME", &arguments->name, "Show the settings as with --context NAME")
       .Completes(ValueKind::kContext);
-  show.OnGiven(act([=] { return Show(*invocation, *arguments); }));
+  OnGiven(show, invocation, arguments, Show, /*needs_server=*/false);
   Command remove = command.AddCommand("remove", "Remove a context");
   remove.AddText("NAME", &arguments->name, "Name of the context")
       .Required()
       .Completes(ValueKind::kContext);
-  remove.OnGiven(act([=] { return Remove(*invocation, *arguments); }));
+  OnGiven(remove, invocation, arguments, Remove, /*needs_server=*/false);
 }
 
 }  // namespace hulld

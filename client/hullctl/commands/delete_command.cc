@@ -135,15 +135,14 @@ void AddDeleteCommand(Command program, Invocation* invocation) {
   command.AddFlag("--yes", &arguments->yes, "Delete several hulls without confirmation");
   command.AddFlag("--if-exists", &arguments->if_exists, "Succeed if a hull does not exist");
   command.AddNumber("--if-revision", 0, kAnyNumber, "Only if the hull is at this revision",
-                    [arguments](uint64_t number) { arguments->if_revision = number; });
+                    &arguments->if_revision);
   command.SetDetails(
       "Deleting several hulls needs a confirmation on the terminal, or --yes. A hull that changes\n"
       "after --prefix listed it is kept, and the exit code is 1.");
   command.SetExamples({{"", "hullctl delete arm/3"},
                        {"All hulls of one cell", "hullctl delete --prefix cell-3/"},
                        {"In a script", "hullctl delete --prefix cell-3/ --yes"}});
-  command.OnGiven(
-      [=] { invocation->action = [=] { return DeleteHulls(*invocation, *arguments); }; });
+  OnGiven(command, invocation, arguments, DeleteHulls);
 }
 
 }  // namespace hulld

@@ -1,7 +1,6 @@
 #include <absl/strings/str_cat.h>
 
 #include <cmath>
-#include <map>
 #include <memory>
 
 #include "client/formats/text_number.h"
@@ -15,18 +14,9 @@ namespace hulld {
 namespace {
 
 struct GenerateArguments {
-  std::string shape;
   CloudOptions cloud;
   std::string file;
 };
-
-const std::map<std::string, Shape>& ShapeNames() {
-  static const auto* const kNames = new std::map<std::string, Shape>{{"ball", Shape::kBall},
-                                                                     {"sphere", Shape::kSphere},
-                                                                     {"cube", Shape::kCube},
-                                                                     {"lattice", Shape::kLattice}};
-  return *kNames;
-}
 
 // Returns true if every possible coordinate is finite.
 bool IsFinite(const CloudOptions& cloud) {
@@ -42,8 +32,7 @@ bool IsFinite(const CloudOptions& cloud) {
 }
 
 ExitCode Generate(const Invocation& run, const GenerateArguments& arguments) {
-  CloudOptions cloud = arguments.cloud;
-  cloud.shape = ShapeNames().at(arguments.shape);
+  const CloudOptions& cloud = arguments.cloud;
   if (!IsFinite(cloud)) {
     return run.FailUsage(
         "a coordinate exceeds the largest double; use a smaller --radius, --size, or --center");
@@ -67,28 +56,21 @@ void AddGenerateCommand(Command program, Invocation* invocation) {
   auto arguments = std::make_shared<GenerateArguments>();
   CloudOptions* const cloud = &arguments->cloud;
   Command command = program.AddCommand("generate", "Write points as XYZ text; needs no server");
-  std::vector<std::string> names;
-  for (const auto& [name, shape] : ShapeNames()) names.push_back(name);
-  command.AddText("SHAPE", &arguments->shape, "Shape that the points fill").Required().OneOf(names);
   command
-      .AddNumber("N", 0, uint64_t{1} << 40, "Number of points",
-                 [cloud](uint64_t number) { cloud->count = number; })
+      .AddChoice("SHAPE",
+                 {{"ball", Shape::kBall},
+                  {"sphere", Shape::kSphere},
+                  {"cube", Shape::kCube},
+                  {"lattice", Shape::kLattice}},
+                 &cloud->shape, "Shape that the points fill")
       .Required();
-  command.AddNumber("--seed", 0, kAnyNumber, "Seed of the points (default 1)",
-                    [cloud](uint64_t number) { cloud->seed = number; });
-  command.AddLength("--radius", "Radius of ball and sphere (default 1)",
-                    [cloud](double length) { cloud->radius = length; });
-  command.AddLength("--size", "Edge of the cube, step of the lattice (default 1)",
-                    [cloud](double length) { cloud->size = length; });
+  command.AddNumber("N", 0, uint64_t{1} << 40, "Number of points", &cloud->count).Required();
+  command.AddNumber("--seed", 0, kAnyNumber, "Seed of the points (default 1)", &cloud->seed);
+  command.AddLength("--radius", "Radius of ball and sphere (default 1)", &cloud->radius);
+  command.AddLength("--size", "Edge of the cube, step of the lattice (default 1)", &cloud->size);
   command
-      .AddParsed(
-          "--center",
-          [cloud](const std::string& text) {
-            const auto center = ParseTriple(text);
-            if (center.ok()) cloud->center = *center;
-            return center.status();
-          },
-          "Center; for the lattice, its first point (default 0,0,0)")
+      .AddParsed("--center", ParseTriple, &cloud->center,
+                 "Center; for the lattice, its first point (default 0,0,0)")
       .ValueName("x,y,z");
   command.AddText("-o,--out", &arguments->file, "File to write (default: standard output)")
       .ValueName("FILE");
@@ -98,10 +80,7 @@ void AddGenerateCommand(Command program, Invocation* invocation) {
   command.SetExamples(
       {{"A cube of edge 2", "hullctl generate lattice 27 | hullctl append cube - --create"},
        {"A hundred thousand points in a ball", "hullctl generate ball 100000 -o ball.xyz"}});
-  command.OnGiven([=] {
-    invocation->needs_server = false;
-    invocation->action = [=] { return Generate(*invocation, *arguments); };
-  });
+  OnGiven(command, invocation, arguments, Generate, /*needs_server=*/false);
 }
 
 }  // namespace hulld

@@ -20,12 +20,17 @@ std::string CountsText(const v1::PointCounts& counts) {
          std::to_string(counts.inside()) + " inside";
 }
 
-ExitCode Create(const Invocation& run, const std::string& hull_id, bool if_absent) {
-  const auto response = run.MakeClient().CreateHull(hull_id, if_absent);
+struct CreateOptions {
+  std::string hull_id;
+  bool if_absent = false;
+};
+
+ExitCode Create(const Invocation& run, const CreateOptions& options) {
+  const auto response = run.MakeClient().CreateHull(options.hull_id, options.if_absent);
   if (!response.ok()) return run.Fail(response.status());
-  if (!run.PrintForPrograms(*response, hull_id)) {
-    run.out << hull_id << (response->created() ? " created" : " already exists") << " at revision "
-            << response->hull().create_revision() << "\n";
+  if (!run.PrintForPrograms(*response, options.hull_id)) {
+    run.out << options.hull_id << (response->created() ? " created" : " already exists")
+            << " at revision " << response->hull().create_revision() << "\n";
   }
   return ExitCode::kDone;
 }
@@ -95,11 +100,6 @@ ExitCode GetHull(const Invocation& run, const v1::GetHullRequest& request) {
   return ExitCode::kDone;
 }
 
-struct CreateOptions {
-  std::string hull_id;
-  bool if_absent = false;
-};
-
 }  // namespace
 
 void AddCreateCommand(Command program, Invocation* invocation) {
@@ -109,9 +109,7 @@ void AddCreateCommand(Command program, Invocation* invocation) {
   command.AddFlag("--if-absent", &options->if_absent, "Succeed if the hull already exists");
   command.SetExamples({{"", "hullctl create arm/3"},
                        {"In a script that can run twice", "hullctl create arm/3 --if-absent"}});
-  command.OnGiven([=] {
-    invocation->action = [=] { return Create(*invocation, options->hull_id, options->if_absent); };
-  });
+  OnGiven(command, invocation, options, Create);
 }
 
 void AddGetCommand(Command program, Invocation* invocation) {
@@ -132,7 +130,7 @@ void AddGetCommand(Command program, Invocation* invocation) {
       {{"", "hullctl get arm/3"},
        {"How heavy is it, and where is its center of mass?", "hullctl get arm/3 --properties"},
        {"As JSON, for a script", "hullctl get arm/3 --output json"}});
-  command.OnGiven([=] { invocation->action = [=] { return GetHull(*invocation, *request); }; });
+  OnGiven(command, invocation, request, GetHull);
 }
 
 }  // namespace hulld

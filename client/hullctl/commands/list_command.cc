@@ -145,7 +145,7 @@ void AddListCommand(Command program, Invocation* invocation) {
       .OneOf(keys);
   command.AddFlag("--reverse", &arguments->reverse, "Reverse the order");
   command.AddNumber("--limit", 1, 1000000000, "Stop after N hulls (default: all)",
-                    [arguments](uint64_t number) { arguments->limit = number; });
+                    &arguments->limit);
   command.AddFlag("--count", &arguments->count,
                   "Print only the numbers of hulls, vertices, points, and bodies");
   AddFreshnessOptions(command, invocation);
@@ -153,7 +153,7 @@ void AddListCommand(Command program, Invocation* invocation) {
                        {"The ten largest", "hullctl list --sort vertices --limit 10"},
                        {"Number of hulls", "hullctl list --count"},
                        {"IDs only, for a script", "hullctl list arm/ --output name"}});
-  command.OnGiven([=] { invocation->action = [=] { return ListHulls(*invocation, *arguments); }; });
+  OnGiven(command, invocation, arguments, ListHulls);
 }
 
 }  // namespace hulld

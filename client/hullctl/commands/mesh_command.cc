@@ -123,7 +123,7 @@ void AddMeshCommand(Command program, Invocation* invocation) {
   command.AddText("-o,--out", &arguments->file, "File to write (default: standard output)")
       .ValueName("FILE");
   command.AddNumber("--max-vertices", 1, kAnyNumber, "Simplify to at most N vertices",
-                    [arguments](uint64_t number) { arguments->max_vertices = number; });
+                    &arguments->max_vertices);
   const auto take_max_error = [arguments](const std::string& text) {
     double& length = arguments->max_error;
     const bool is_number = ParseDouble(text, &length) == NumberText::kNumber;
@@ -148,7 +148,7 @@ void AddMeshCommand(Command program, Invocation* invocation) {
   command.SetExamples({{"", "hullctl mesh spider -o spider-hull.obj"},
                        {"At most 16 vertices, enclosing the hull",
                         "hullctl mesh spider --max-vertices 16 --outside -o simple.obj"}});
-  command.OnGiven([=] { invocation->action = [=] { return Mesh(*invocation, *arguments); }; });
+  OnGiven(command, invocation, arguments, Mesh);
 }
 
 }  // namespace hulld

@@ -109,14 +109,14 @@ void AddReplaceCommand(Command program, Invocation* invocation) {
                   "Accept files without points: the hull becomes empty");
   command.AddNumber("--if-revision", 0, std::numeric_limits<uint64_t>::max(),
                     "Only if the hull is at this revision; 0: only if it does not exist",
-                    [arguments](uint64_t number) { arguments->if_revision = number; });
+                    &arguments->if_revision);
   command.SetDetails(
       "Runs without a time limit unless --timeout is given. A failed call leaves the hull\n"
       "unchanged, except that it may have been replaced if all points had been sent.");
   command.SetExamples({{"", "hullctl replace arm arm-v2.stl"},
                        {"Only if it is unchanged since revision 7",
                         "hullctl replace arm arm-v2.stl --if-revision 7"}});
-  command.OnGiven([=] { invocation->action = [=] { return Replace(*invocation, *arguments); }; });
+  OnGiven(command, invocation, arguments, Replace);
 }
 
 }  // namespace hulld

@@ -5,6 +5,7 @@
 #include <memory>
 #include <unordered_map>
 
+#include "client/formats/text_number.h"
 #include "client/hullctl/command_line/freshness_options.h"
 #include "client/hullctl/command_line/query_options.h"
 #include "client/hullctl/commands/commands.h"
@@ -48,12 +49,11 @@ class SceneRun {
     if (run_.json()) run_.out << MessageJson(part) << "\n";
     for (const v1::PlacementProblem& problem : part.placement_problems()) {
       ++placement_problems_;
-      const std::string* const id = scene_.HullOf(problem.placement());
-      if (id == nullptr) {
+      if (scene_.HullOf(problem.placement()) == nullptr) {
         return absl::InternalError("the answer refers to a placement that does not exist");
       }
       run_.err << "hullctl: placement " << scene_.NameOf(problem.placement()) << ": "
-               << scene_.ProblemText(*id, problem) << "\n";
+               << scene_.ProblemText(problem.placement(), problem) << "\n";
     }
     std::unordered_map<uint64_t, std::string> problems;
     for (const v1::PairProblem& problem : part.columns().pair_problems()) {
@@ -126,7 +126,7 @@ void AddChoiceOptions(Command command, SceneArguments* arguments) {
           "--nearest", 1, std::numeric_limits<uint32_t>::max(),
           "Find only the N pairs of least separation, nearest first, within --clearance if it is "
           "given; implies --separation",
-          [arguments](uint64_t number) { arguments->nearest = static_cast<uint32_t>(number); })
+          &arguments->nearest)
       .ValueName("N");
   command.AddFlag("--first", &arguments->first,
                   "Of pairs in motion, find only those that may be the first to touch");
@@ -143,9 +143,7 @@ void SetNearest(uint32_t count, v1::FindCollisionsRequest* request) {
 }
 
 ExitCode Find(const Invocation& run, const SceneArguments& arguments, Scene* read) {
-  double tolerance = read->request.tolerance();
-  arguments.details.Apply(read->request.mutable_wanted(), &tolerance);
-  read->request.set_tolerance(tolerance);
+  arguments.details.Apply(&read->request);
   if (arguments.nearest > 0) SetNearest(arguments.nearest, &read->request);
   if (arguments.first) read->request.set_first_only(true);
   if (arguments.every_piece) read->request.set_every_piece(true);
@@ -191,7 +189,7 @@ ExitCode CheckScene(const Invocation& run, const SceneArguments& arguments) {
   return Find(run, arguments, &*read);
 }
 
-void AddCheck(Command scene, const std::string* scene_file, Invocation* invocation) {
+void AddCheck(Command scene, Invocation* invocation) {
   auto arguments = std::make_shared<SceneArguments>();
   Command command = scene.AddCommand("check", "Answer the queries of a scene file");
   command.AddText("FILE", &arguments->file, "The scene; - is standard input").Required();
@@ -203,12 +201,7 @@ void AddCheck(Command scene, const std::string* scene_file, Invocation* invocati
       "that collide or are within the clearance, as 'hullctl scene FILE' does. Uses the\n"
       "hulls and bodies on the server; 'hullctl scene apply' creates them.");
   command.SetExamples({{"", "hullctl scene check cell.yaml --separation"}});
-  command.OnGiven([=] {
-    invocation->action = [=] {
-      const absl::Status alone = RefuseSecondFile(*scene_file);
-      return alone.ok() ? CheckScene(*invocation, *arguments) : invocation->FailUsage(alone);
-    };
-  });
+  OnGiven(command, invocation, arguments, CheckScene);
 }
 
 }  // namespace
@@ -233,10 +226,15 @@ void AddSceneCommand(Command program, Invocation* invocation) {
     // A subcommand has already set the action.
     if (invocation->action == nullptr) {
       invocation->action = [=] { return FindInScene(*invocation, *arguments); };
+    } else if (!arguments->file.empty()) {
+      invocation->action = [=] {
+        return invocation->FailUsage(
+            absl::StrCat("unexpected argument ", Quoted(arguments->file), "; a scene is one file"));
+      };
     }
   });
-  AddSceneSyncCommands(command, &arguments->file, invocation);
-  AddCheck(command, &arguments->file, invocation);
+  AddSceneSyncCommands(command, invocation);
+  AddCheck(command, invocation);
 }
 
 }  // namespace hulld

@@ -1,3 +1,6 @@
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_replace.h>
+#include <google/protobuf/descriptor.h>
 
 #include "client/hullctl/commands/commands.h"
 #include "client/hullctl/printing/answer_text.h"
@@ -14,22 +17,20 @@ std::string UptimeText(const google::protobuf::Duration& uptime) {
   return std::to_string(seconds / 3600) + " h " + std::to_string(seconds / 60 % 60) + " min";
 }
 
-void AddMoreLimits(const v1::Limits& limits, Table* table) {
-  table->Row({"max message bytes", std::to_string(limits.max_message_bytes())})
-      .Row({"max points per hull", std::to_string(limits.max_points_per_hull())})
-      .Row({"max placements", std::to_string(limits.max_placements())})
-      .Row({"max calls", std::to_string(limits.max_calls())})
-      .Row({"max waiting calls", std::to_string(limits.max_waiting_calls())})
-      .Row({"max streams per client", std::to_string(limits.max_streams_per_client())})
-      .Row({"max concurrent batches", std::to_string(limits.max_concurrent_batches())})
-      .Row({"max calls per client", std::to_string(limits.max_calls_per_client())})
-      .Row({"max batches per client", std::to_string(limits.max_batches_per_client())})
-      .Row({"max pieces per body", std::to_string(limits.max_pieces_per_body())})
-      .Row({"max writers per hull", std::to_string(limits.max_writers_per_hull())})
-      .Row({"memory limit bytes", std::to_string(limits.memory_limit_bytes())})
-      .Row({"request memory bytes", std::to_string(limits.request_memory_bytes())});
-  if (limits.has_max_request_time()) {
-    table->Row({"max request time", DurationText(limits.max_request_time())});
+// Number of limits that every table shows; `--output wide` shows all.
+constexpr int kMainLimits = 5;
+
+// Adds the limits from `first` on, before `end`, in the order of the contract, by the names of
+// their fields.
+void AddLimits(const v1::Limits& limits, int first, int end, Table* table) {
+  for (int i = first; i < end; ++i) {
+    const google::protobuf::FieldDescriptor* const field = limits.GetDescriptor()->field(i);
+    const std::string name = absl::StrReplaceAll(field->name(), {{"_", " "}});
+    if (field->message_type() == nullptr) {
+      table->Row({name, absl::StrCat(limits.GetReflection()->GetUInt64(limits, field))});
+    } else if (limits.has_max_request_time()) {
+      table->Row({name, DurationText(limits.max_request_time())});
+    }
   }
 }
 
@@ -44,16 +45,12 @@ void PrintStatus(const Invocation& run, const v1::GetStatusResponse& status,
       .Row({"store", status.store_kind() + "  " + status.header().store_id()})
       .Row({"revision", std::to_string(status.header().revision())})
       .Row({"hulls", status.has_hull_count() ? std::to_string(status.hull_count()) : "-"})
-      .Row({"vertices", status.has_vertex_count() ? std::to_string(status.vertex_count()) : "-"})
-      .Row({"max points per chunk", std::to_string(limits.max_points_per_chunk())})
-      .Row({"max vertices per hull", std::to_string(limits.max_vertices_per_hull())})
-      .Row({"max hulls", std::to_string(limits.max_hulls())})
-      .Row({"max pairs per batch", std::to_string(limits.max_pairs_per_batch())})
-      .Row({"max textbook axes", std::to_string(limits.max_textbook_axes())});
+      .Row({"vertices", status.has_vertex_count() ? std::to_string(status.vertex_count()) : "-"});
+  AddLimits(limits, 0, kMainLimits, &table);
   if (run.wide()) {
     const bool known = status.has_body_count();
     table.Row({"bodies", known ? std::to_string(status.body_count()) : "-"});
-    AddMoreLimits(limits, &table);
+    AddLimits(limits, kMainLimits, v1::Limits::descriptor()->field_count(), &table);
   }
   table.Print(run.out);
 }
@@ -89,7 +86,7 @@ void AddStatusCommand(Command program, Invocation* invocation) {
   command.SetDetails("Exits with 0 only if the server answers and is serving.");
   command.SetExamples({{"", "hullctl status --server hulls.example:50551 --tls"},
                        {"All limits", "hullctl status --output wide"}});
-  command.OnGiven([=] { invocation->action = [=] { return Status(*invocation); }; });
+  OnGiven(command, invocation, Status);
 }
 
 void AddHealthCommand(Command program, Invocation* invocation) {
@@ -97,7 +94,7 @@ void AddHealthCommand(Command program, Invocation* invocation) {
       program.AddCommand("health", "Show whether the server is serving; needs no token");
   health.SetDetails("Exits with 0 only if it is.");
   health.SetExamples({{"Wait for a server in a script", "until hullctl health; do sleep 1; done"}});
-  health.OnGiven([=] { invocation->action = [=] { return Health(*invocation); }; });
+  OnGiven(health, invocation, Health);
 }
 
 }  // namespace hulld

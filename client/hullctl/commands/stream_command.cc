@@ -65,9 +65,7 @@ class StreamRun {
     }
     if (answer->placement_problems_size() > 0 || answer->hulls_size() > 0) problems_.clear();
     for (const v1::PlacementProblem& problem : answer->placement_problems()) {
-      const std::string* const id = scene_.HullOf(problem.placement());
-      problems_[problem.placement()] =
-          id == nullptr ? problem.message() : scene_.ProblemText(*id, problem);
+      problems_[problem.placement()] = scene_.ProblemText(problem.placement(), problem);
     }
     PrintRows(*answer);
     return absl::OkStatus();
@@ -130,9 +128,7 @@ ExitCode Stream(const Invocation& run, const StreamArguments& arguments) {
   if (!scene.ok()) return run.FailUsage(scene.status());
   auto pairs = PairsOf(*scene, arguments.file);
   if (!pairs.ok()) return run.FailUsage(pairs.status());
-  double tolerance = scene->request.tolerance();
-  arguments.details.Apply(scene->request.mutable_wanted(), &tolerance);
-  scene->request.set_tolerance(tolerance);
+  arguments.details.Apply(&scene->request);
   StreamRun stream(run, *scene, *std::move(pairs));
   absl::Status status = stream.Open(scene->only_changes || arguments.only_changes);
   std::string text;
@@ -173,7 +169,7 @@ void AddStreamCommand(Command program, Invocation* invocation) {
   command.SetExamples({{"", "hullctl stream poses.jsonl"},
                        {"Contacts as they begin and end, as messages of the contract",
                         "simulator | hullctl stream - --only-changes --output json"}});
-  command.OnGiven([=] { invocation->action = [=] { return Stream(*invocation, *arguments); }; });
+  OnGiven(command, invocation, arguments, Stream);
 }
 
 }  // namespace hulld

@@ -121,15 +121,9 @@ void AddTokenCommand(Command program, Invocation* invocation) {
   make.SetExamples({{"For a robot that may write under cell-1/",
                      "hullctl token new robot-1 --role read-write --prefix cell-1/ "
                      "--token-out robot-1.token >> tokens"}});
-  make.OnGiven([=] {
-    invocation->needs_server = false;
-    invocation->action = [=] { return NewToken(*invocation, *arguments); };
-  });
+  OnGiven(make, invocation, arguments, NewToken, /*needs_server=*/false);
   Command hash = command.AddCommand("hash", "Print the hash of a token read from standard input");
-  hash.OnGiven([=] {
-    invocation->needs_server = false;
-    invocation->action = [=] { return HashToken(*invocation); };
-  });
+  OnGiven(hash, invocation, HashToken, /*needs_server=*/false);
 }
 
 }  // namespace hulld

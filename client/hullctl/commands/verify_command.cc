@@ -60,7 +60,7 @@ void AddVerifyCommand(Command program, Invocation* invocation) {
       "answer immediately, use 'hullctl check --verify'.");
   command.SetExamples(
       {{"", "hullctl check arm box --record answer.json"}, {"", "hullctl verify answer.json"}});
-  command.OnGiven([=] { invocation->action = [=] { return Verify(*invocation, *path); }; });
+  OnGiven(command, invocation, path, Verify);
 }
 
 }  // namespace hulld

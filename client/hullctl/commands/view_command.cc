@@ -225,7 +225,7 @@ class Viewing {
   // other server receives its vertices with each query.
   absl::Status AddFile(const std::string& path, ViewScene* scene) {
     HULLD_ASSIGN_OR_RETURN(auto shape, ReadShape(path));
-    ViewObject object{shape.name, "", static_cast<int>(scene->files.size()), kIdentityPose};
+    ViewObject object{shape.name, "", static_cast<int>(scene->files.size()), kNoMotion};
     const absl::Status hull = run_.local ? RegisterHull(path, &object) : BuildHull(path, &shape);
     if (!hull.ok()) {
       run_.err << "hullctl: warning: " << path << " is shown without its hull\n";
@@ -365,13 +365,11 @@ ExitCode View(const Invocation& run, const ViewArguments& arguments) {
 
 void AddRobotOptions(Command command, RobotSceneArguments* robot) {
   command.AddText("--joints", &robot->joints, "Trajectory of a robot, as for 'hullctl robot check'")
-      .ValueName("FILE")
-      .Completes(ValueKind::kFile);
+      .ValueName("FILE");
   command
       .AddText("--srdf", &robot->srdf,
                "Exclude exactly the pairs of links that this semantic description disables")
-      .ValueName("FILE")
-      .Completes(ValueKind::kFile);
+      .ValueName("FILE");
   command
       .AddRepeated("--ignore", &robot->ignored,
                    "Exclude two links, or a link and a placement; repeatable")
@@ -396,10 +394,9 @@ void AddViewCommand(Command program, Invocation* invocation) {
       .AddText("--scene", &arguments->scene,
                "Scene around a robot, as for 'hullctl robot check'; or the first scene of --demo, "
                "0 to 7")
-      .ValueName("FILE")
-      .Completes(ValueKind::kFile);
+      .ValueName("FILE");
   command.AddNumber("--port", 0, 65535, "Port on 127.0.0.1 (default 0: any free one)",
-                    [arguments](uint64_t port) { arguments->port = static_cast<uint16_t>(port); });
+                    &arguments->port);
   command.AddFlag("--no-open", &arguments->no_open, "Print the address and open no browser");
   command
       .AddText("--html", &arguments->html_file,
@@ -409,18 +406,14 @@ void AddViewCommand(Command program, Invocation* invocation) {
       .AddText("--png", &arguments->png_file,
                "Write a picture, drawn by a headless browser, and exit")
       .ValueName("FILE");
-  const auto take_size = [arguments](const std::string& text) {
-    const auto size = ParsePictureSize(text);
-    if (size.ok()) arguments->size = *size;
-    return size.status();
-  };
-  command.AddParsed("--size", take_size, "Pixels of --png (default 1600x1000)")
+  command
+      .AddParsed("--size", ParsePictureSize, &arguments->size,
+                 "Pixels of --png (default 1600x1000)")
       .ValueName("WIDTHxHEIGHT");
   command
       .AddText("--recording", &arguments->recording,
                "Play a recorded watch: the output of 'hullctl watch --output json'")
-      .ValueName("FILE")
-      .Completes(ValueKind::kFile);
+      .ValueName("FILE");
   AddRobotOptions(command, &arguments->robot);
   command.AddText("--up", &arguments->up, "The axis that points up (default z for a robot, else y)")
       .ValueName("x|y|z")
@@ -453,7 +446,7 @@ void AddViewCommand(Command program, Invocation* invocation) {
        {"The collisions of a scene over time", "hullctl view scene.yaml --recording watch.jsonl"},
        {"A file to share", "hullctl view arm --html arm.html"},
        {"A picture for a report", "hullctl view scene.yaml --png scene.png --size 1200x800"}});
-  command.OnGiven([=] { invocation->action = [=] { return View(*invocation, *arguments); }; });
+  OnGiven(command, invocation, arguments, View);
 }
 
 }  // namespace hulld

@@ -143,21 +143,17 @@ std::string DecidingPieces(const Scene& scene, const v1::CollisionEvent& event) 
 ExitCode WatchScene(const Invocation& run, const WatchOptions& options) {
   const auto scene = ReadWholeScene(options.scene, "watch");
   if (!scene.ok()) return run.FailUsage(scene.status());
-  const auto name = [&](uint32_t placement) {
-    return scene->HullOf(placement) == nullptr ? absl::StrCat(placement) : scene->NameOf(placement);
-  };
   uint64_t events = 0;
   bool is_synced = false;
   const auto print = [&](const v1::WatchCollisionsResponse& message) {
     for (const v1::PlacementProblem& problem : message.placement_problems()) {
-      const std::string* const id = scene->HullOf(problem.placement());
-      run.err << "hullctl: placement " << name(problem.placement()) << ": "
-              << (id == nullptr ? problem.message() : scene->ProblemText(*id, problem)) << "\n";
+      run.err << "hullctl: placement " << scene->NameOf(problem.placement()) << ": "
+              << scene->ProblemText(problem.placement(), problem) << "\n";
     }
     for (const v1::CollisionEvent& event : message.events()) {
       if (run.json()) break;
-      run.out << KindText(event.kind()) << "\t" << name(event.placement_a()) << "\t"
-              << name(event.placement_b());
+      run.out << KindText(event.kind()) << "\t" << scene->NameOf(event.placement_a()) << "\t"
+              << scene->NameOf(event.placement_b());
       if (event.kind() != v1::COLLISION_EVENT_KIND_LOST) {
         run.out << "\t" << event.revision_a() << "\t" << event.revision_b();
       }
@@ -189,12 +185,11 @@ void AddWatchCommand(Command program, Invocation* invocation) {
   command
       .AddText("--scene", &options->scene,
                "Watch the pairs of a scene instead: print collisions that begin and end")
-      .ValueName("FILE")
-      .Completes(ValueKind::kFile);
+      .ValueName("FILE");
   command.AddFlag("--until-synced", &options->until_synced, "Exit after the initial state");
   command.AddNumber("--events", 1, kAnyNumber,
                     "Exit after N events, or slightly more if several arrive together",
-                    [options](uint64_t number) { options->events = number; });
+                    &options->events);
   command.SetDetails(
       "Prints one line per event: kind, ID, revision, vertices and points, and box; for a body,\n"
       "its number of pieces. The initial state comes first (PRESENT) and ends with a line\n"

@@ -38,48 +38,22 @@ absl::Status ReadDistinctPoints(const ReadRequest& request, v1::PointBlock* poin
   return ReadPoints(request, receive).status();
 }
 
-using Feed = std::function<absl::Status(const Client::PointSink& sink)>;
-
-Feed FeedOf(const ReadRequest& request) {
+Client::PointFeed FeedOf(const ReadRequest& request) {
   return [&request](const Client::PointSink& sink) {
     return ReadPoints(request, [&sink](const PointChunk& block) { return sink(ToProto(block)); })
         .status();
   };
 }
 
-absl::Status Register(const Client& client, const std::string& hull_id, const Feed& feed) {
-  v1::ReplaceOpen open;
-  open.set_hull_id(hull_id);
-  open.set_create_if_absent(true);
-  return client.ReplaceHull(open, feed).status();
-}
-
-// Returns the hulls of the points from each feed, built by a local server.
-absl::StatusOr<std::vector<HullMesh>> Build(const std::vector<Feed>& feeds) {
-  HULLD_ASSIGN_OR_RETURN(const auto server, LocalServer::Start());
-  ClientOptions options;
-  options.server = server->address();
-  options.own_connection = true;
-  const Client client(options);
-  std::vector<HullMesh> hulls;
-  for (const Feed& feed : feeds) {
-    HULLD_RETURN_IF_ERROR(Register(client, "shape", feed));
-    HULLD_ASSIGN_OR_RETURN(auto mesh, client.GetHullMesh("shape"));
-    hulls.push_back(std::move(mesh));
-  }
-  return hulls;
-}
-
 // Sets `points` to the vertices of the hull of a file.
 absl::Status ReadVertices(const ReadRequest& request, v1::PointBlock* points) {
-  const auto hulls = Build({FeedOf(request)});
-  if (!hulls.ok()) {
-    return absl::Status(hulls.status().code(),
+  const auto mesh = HullBuilder().Build(FeedOf(request));
+  if (!mesh.ok()) {
+    return absl::Status(mesh.status().code(),
                         absl::StrCat(request.path, " has more than ", kMaxShapePoints,
                                      " points, so a local server has to find the vertices: ",
-                                     hulls.status().message()));
+                                     mesh.status().message()));
   }
-  const HullMesh* const mesh = &hulls->front();
   if (mesh->vertex_count() > kMaxShapePoints) {
     return absl::InvalidArgumentError(
         absl::StrCat(request.path, ": its hull has ", mesh->vertex_count(),
@@ -109,7 +83,7 @@ absl::Status SetShape(const Invocation& run, const std::string& path, v1::Placem
     if (run.local) {
       // The full path, to distinguish files in different folders.
       const std::string id = HullSegment(request.path);
-      HULLD_RETURN_IF_ERROR(Register(run.MakeClient(), id, FeedOf(request)));
+      HULLD_RETURN_IF_ERROR(run.MakeClient().PutHull(id, FeedOf(request)));
       placement->set_hull_id(id);
       return absl::OkStatus();
     }
@@ -123,16 +97,18 @@ absl::StatusOr<HullMesh> HullOfFile(const std::string& path) {
   HULLD_ASSIGN_OR_RETURN(const auto format, PointFormatOfPath(path));
   ReadRequest request{path, format, {}, {}};
   request.options.skip_nonfinite = true;
-  HULLD_ASSIGN_OR_RETURN(auto hulls, Build({FeedOf(request)}));
-  return std::move(hulls.front());
+  return HullBuilder().Build(FeedOf(request));
 }
 
 absl::StatusOr<std::vector<HullMesh>> HullsOfShapes(const std::vector<v1::PointBlock>& shapes) {
-  std::vector<Feed> feeds;
+  HullBuilder builder;
+  std::vector<HullMesh> hulls;
   for (const v1::PointBlock& shape : shapes) {
-    feeds.emplace_back([&shape](const Client::PointSink& sink) { return sink(shape); });
+    HULLD_ASSIGN_OR_RETURN(
+        auto hull, builder.Build([&](const Client::PointSink& sink) { return sink(shape); }));
+    hulls.push_back(std::move(hull));
   }
-  return Build(feeds);
+  return hulls;
 }
 
 }  // namespace hulld

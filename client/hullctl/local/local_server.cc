@@ -15,6 +15,8 @@
 #include <utility>
 #include <vector>
 
+#include "client/status_macros.h"
+
 extern char** environ;
 
 namespace hulld {
@@ -160,6 +162,18 @@ LocalServer::~LocalServer() {
   while (keeper_ != 0 && waitpid(keeper_, nullptr, 0) < 0 && errno == EINTR) {
   }
   if (log_reader_.joinable()) log_reader_.join();
+}
+
+absl::StatusOr<HullMesh> HullBuilder::Build(const Client::PointFeed& feed) {
+  if (!client_.has_value()) {
+    HULLD_ASSIGN_OR_RETURN(server_, LocalServer::Start());
+    ClientOptions options;
+    options.server = server_->address();
+    options.own_connection = true;
+    client_.emplace(std::move(options));
+  }
+  HULLD_RETURN_IF_ERROR(client_->PutHull("hull", feed));
+  return client_->GetHullMesh("hull");
 }
 
 }  // namespace hulld

@@ -5,8 +5,11 @@
 #include <sys/types.h>
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <thread>
+
+#include "client/client.h"
 
 namespace hulld {
 
@@ -38,6 +41,17 @@ class LocalServer {
   int keeper_input_ = -1;
   // Reads the log to its end, so that the server never blocks on a full pipe.
   std::thread log_reader_;
+};
+
+// Builds hulls on a private server, which the first hull starts.
+class HullBuilder {
+ public:
+  // Returns the hull of the points. Errors of LocalServer::Start and of the server.
+  absl::StatusOr<HullMesh> Build(const Client::PointFeed& feed);
+
+ private:
+  std::unique_ptr<LocalServer> server_;
+  std::optional<Client> client_;
 };
 
 }  // namespace hulld

@@ -350,20 +350,18 @@ void AddJudgeCommand(Command program, Invocation* invocation) {
   auto arguments = std::make_shared<JudgeArguments>();
   Command command = program.AddCommand("judge", "Find the wrong answers of another program");
   command.AddText("FILE", &arguments->file, "A table of answers, CSV; - is standard input")
-      .Required()
-      .Completes(ValueKind::kFile);
+      .Required();
   command.AddLength("--max-error",
                     "Largest error that a distance or depth may have (default 0: as exact as the "
                     "proven bound)",
-                    [data = arguments.get()](double length) { data->allowed.error = length; });
+                    &arguments->allowed.error);
   command.AddLength("--max-time-error",
                     "How far a time of contact may be outside of the proven bracket (default 0)",
-                    [data = arguments.get()](double time) { data->allowed.time_error = time; });
+                    &arguments->allowed.time_error);
   command
       .AddText("--plot", &arguments->plot_file,
                "Plot time and error of the program next to those of hulld, as SVG, with gnuplot")
-      .ValueName("FILE")
-      .Completes(ValueKind::kFile);
+      .ValueName("FILE");
   AddFreshnessOptions(command, invocation);
   command.SetDetails(
       "The table has a header of column names, in any order, then a row for each answer:\n"
@@ -387,8 +385,7 @@ void AddJudgeCommand(Command program, Invocation* invocation) {
        {"Files, without a server; distances to a micrometer",
         "hullctl judge answers.csv --local --max-error 1e-6"},
        {"A chart of time and error", "hullctl judge answers.csv --plot trade.svg"}});
-  command.OnGiven(
-      [=] { invocation->action = [=] { return JudgeTable(*invocation, *arguments); }; });
+  OnGiven(command, invocation, arguments, JudgeTable);
 }
 
 }  // namespace hulld

@@ -93,18 +93,18 @@ void PrintCoverageJson(const Invocation& run, const TriangleMesh& mesh, const Co
   object.AddJson("enclosed", coverage.uncovered.empty() ? "true" : "false")
       .Add("triangles", uint64_t{mesh.triangles.size()})
       .Add("outside", uint64_t{coverage.uncovered.size()});
-  std::string list = "[";
+  std::vector<std::string> outside;
   for (const UncoveredTriangle& found : coverage.uncovered) {
-    JsonObject one;
-    one.Add("triangle", uint64_t{found.triangle})
-        .AddJson("distance", ShortestText(found.distance))
-        .AddJson("area", ShortestText(found.area))
-        .AddJson("point",
-                 absl::StrCat("[", ShortestText(found.point[0]), ",", ShortestText(found.point[1]),
-                              ",", ShortestText(found.point[2]), "]"));
-    absl::StrAppend(&list, list.size() > 1 ? "," : "", one.Close());
+    outside.push_back(
+        JsonObject()
+            .Add("triangle", uint64_t{found.triangle})
+            .AddJson("distance", ShortestText(found.distance))
+            .AddJson("area", ShortestText(found.area))
+            .AddJson("point", JsonArray({ShortestText(found.point[0]), ShortestText(found.point[1]),
+                                         ShortestText(found.point[2])}))
+            .Close());
   }
-  run.out << object.AddJson("trianglesOutside", list + "]").Close() << "\n";
+  run.out << object.AddJson("trianglesOutside", JsonArray(outside)).Close() << "\n";
 }
 
 void PrintCoverage(const Invocation& run, const CoverArguments& arguments, const TriangleMesh& mesh,
@@ -184,7 +184,7 @@ void AddCoverCommand(Command program, Invocation* invocation) {
   command.AddNumber(
       "--limit", 0, kAnyNumber,
       absl::StrCat("Triangles to list, the farthest first (default ", kDefaultLimit, ")"),
-      [arguments](uint64_t number) { arguments->limit = number; });
+      &arguments->limit);
   command.SetDetails(
       "Checks that each point of each triangle of the mesh is in one of the hulls, boundaries\n"
       "included. A body stands for its pieces at their exact poses. The decision is exact:\n"
@@ -197,8 +197,7 @@ void AddCoverCommand(Command program, Invocation* invocation) {
   command.SetExamples({{"", "hullctl cover bracket bracket.stl"},
                        {"The pieces of a body together", "hullctl cover chair chair.obj"},
                        {"All hulls with a prefix", "hullctl cover chair/ chair.obj"}});
-  command.OnGiven(
-      [=] { invocation->action = [=] { return AnswerCover(*invocation, *arguments); }; });
+  OnGiven(command, invocation, arguments, AnswerCover);
 }
 
 }  // namespace hulld

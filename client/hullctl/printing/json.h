@@ -30,6 +30,14 @@ std::string QuoteJson(std::string_view text);
 // Returns an array of values that are already JSON.
 std::string JsonArray(const std::vector<std::string>& values);
 
+// Returns the array of what `json_of` returns for each of the items.
+template <typename Items, typename JsonOf>
+std::string JsonArray(const Items& items, const JsonOf& json_of) {
+  std::vector<std::string> values;
+  for (const auto& item : items) values.push_back(json_of(item));
+  return JsonArray(values);
+}
+
 // Writes one object member by member, in the same mapping.
 class JsonObject {
  public:

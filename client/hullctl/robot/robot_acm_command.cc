@@ -159,9 +159,9 @@ void AddRobotAcmCommand(Command robot, Invocation* invocation) {
   AddRobotArguments(command, &arguments->robot);
   command.AddNumber("--samples", 1, uint64_t{1} << 32,
                     absl::StrCat("Number of configurations (default ", kDefaultSamples, ")"),
-                    [arguments](uint64_t number) { arguments->samples = number; });
+                    &arguments->samples);
   command.AddNumber("--seed", 0, kAnyNumber, "Seed of the configurations (default 1)",
-                    [arguments](uint64_t number) { arguments->seed = number; });
+                    &arguments->seed);
   command.AddText("-o,--out", &arguments->file, "File to write (default: standard output)")
       .ValueName("FILE");
   command.SetDetails(
@@ -173,7 +173,7 @@ void AddRobotAcmCommand(Command robot, Invocation* invocation) {
       "floating joint between them are neither sampled nor written, as their motion is unbounded.\n"
       "Touching counts as colliding.");
   command.SetExamples({{"", "hullctl robot acm arm.urdf --samples 10000 -o arm.srdf"}});
-  command.OnGiven([=] { invocation->action = [=] { return MakeAcm(*invocation, *arguments); }; });
+  OnGiven(command, invocation, arguments, MakeAcm);
 }
 
 }  // namespace hulld

@@ -154,7 +154,7 @@ absl::Status RobotCheck::AddScene() {
     around_.hulls.push_back(*scene_.HullOf(i));
     const v1::Placement placement = scene_.PlacementOf(i);
     around_.radii.push_back(placement.radius());
-    const Pose7 pose = NumbersOf(placement.pose());
+    const RigidPose pose = NumbersOf(placement.pose());
     around_.poses.insert(around_.poses.end(), pose.begin(), pose.end());
   }
   return absl::OkStatus();
@@ -215,12 +215,13 @@ absl::StatusOr<std::vector<Waypoint>> RobotCheck::ReadWaypoints(size_t most) {
 }
 
 absl::Status RobotCheck::CheckWaypoints(CheckScope scope) {
-  double tolerance = 0;
-  v1::Wanted wanted;
-  arguments_.details.Apply(&wanted, &tolerance);
+  v1::CollisionStreamOpen query;
+  arguments_.details.Apply(&query);
   // A single waypoint is examined in detail.
-  if (!waypoints_.has_many() && tolerance == 0) wanted.set_separation(true);
-  WaypointStream stream(client_, std::move(scope), std::move(wanted), tolerance,
+  if (!waypoints_.has_many() && query.tolerance() == 0) {
+    query.mutable_wanted()->set_separation(true);
+  }
+  WaypointStream stream(client_, std::move(scope), query.wanted(), query.tolerance(),
                         [this](uint64_t waypoint, size_t pair, const AnswerRow& row,
                                const std::string& problem) { Take(waypoint, pair, row, problem); });
   while (!IsFinished()) {
@@ -488,8 +489,7 @@ void AddPairOptions(Command command, RobotCheckArguments* arguments) {
   command
       .AddText("--srdf", &arguments->srdf,
                "Exclude exactly the pairs of links that this semantic description disables")
-      .ValueName("FILE")
-      .Completes(ValueKind::kFile);
+      .ValueName("FILE");
   command.AddFlag("--adjacent", &arguments->adjacent,
                   "Without --srdf: include links connected by a joint, or by joints through links "
                   "without shapes");
@@ -500,8 +500,7 @@ void AddWaypointOptions(Command command, const std::shared_ptr<RobotCheckArgumen
   command
       .AddText("--joints,--trajectory", &arguments->joints,
                "CSV table: a header of joints, then a row per waypoint; - is standard input")
-      .ValueName("FILE")
-      .Completes(ValueKind::kFile);
+      .ValueName("FILE");
   command
       .AddRepeated("--joint", &arguments->joint_values,
                    "Value of a joint, without --joints; a pose [w,x,y,z,]x,y,z for a floating "
@@ -510,12 +509,11 @@ void AddWaypointOptions(Command command, const std::shared_ptr<RobotCheckArgumen
   command
       .AddParsed(
           "--base",
-          [arguments](const std::string& text) {
-            const auto pose = ParsePose(text);
-            if (pose.ok()) arguments->X_WB = NumbersOf(*pose);
-            return pose.status();
+          [](const std::string& text) -> absl::StatusOr<RigidPose> {
+            HULLD_ASSIGN_OR_RETURN(const auto pose, ParsePose(text));
+            return NumbersOf(pose);
           },
-          "Pose of the robot: [w,x,y,z,]x,y,z (default: the origin)")
+          &arguments->X_WB, "Pose of the robot: [w,x,y,z,]x,y,z (default: the origin)")
       .ValueName("POSE");
 }
 
@@ -525,8 +523,7 @@ void AddSceneOptions(Command command, RobotCheckArguments* arguments) {
       .AddText(
           "--scene", &arguments->scene,
           "Scene around the robot, as for 'hullctl scene'; its hulls and bodies are on the server")
-      .ValueName("FILE")
-      .Completes(ValueKind::kFile);
+      .ValueName("FILE");
   command
       .AddRepeated("--ignore", &arguments->ignored,
                    "Exclude two links, or a link and a placement; repeatable")
@@ -586,12 +583,11 @@ void AddRobotCheckCommand(Command robot, Invocation* invocation) {
       .AddLength(
           "--resolution",
           "With --continuous: a pair that comes this close may be left undecided (default 1e-6)",
-          [arguments](double length) { arguments->resolution = length; })
+          &arguments->resolution)
       .Needs(continuous);
   AddWantedOptions(command, &arguments->details);
   DescribeRobotCheck(command);
-  command.OnGiven(
-      [=] { invocation->action = [=] { return CheckRobot(*invocation, *arguments); }; });
+  OnGiven(command, invocation, arguments, CheckRobot);
 }
 
 void AddRobotCommand(Command program, Invocation* invocation) {

@@ -16,7 +16,6 @@
 #include "client/hullctl/local/file_shape.h"
 #include "client/hullctl/local/local_server.h"
 #include "client/hullctl/parts/volume_comparison.h"
-#include "client/hullctl/robot/mesh_pieces.h"
 #include "client/point_messages.h"
 #include "client/robot/package_path.h"
 #include "client/robot/urdf_file.h"
@@ -59,13 +58,6 @@ absl::StatusOr<PackagePaths> PathsOf(const RobotArguments& arguments) {
   return paths;
 }
 
-MeshSplit SplitOf(const RobotArguments& arguments) {
-  return arguments.split == "names"        ? MeshSplit::kNames
-         : arguments.split == "components" ? MeshSplit::kComponents
-         : arguments.split == "none"       ? MeshSplit::kNone
-                                           : MeshSplit::kAutomatic;
-}
-
 absl::StatusOr<std::vector<MeshPiece>> ShapePieces(const CollisionShape& shape,
                                                    const PackagePaths& paths, MeshSplit split) {
   if (shape.kind != ShapeKind::kMesh) return std::vector<MeshPiece>{{PrimitiveHull(shape), {}}};
@@ -79,7 +71,7 @@ absl::Status AddLink(const RobotArguments& arguments, const PackagePaths& paths,
   const RobotLink& from = model->robot.links[link];
   const size_t first = model->parts.size();
   for (const CollisionShape& shape : from.shapes) {
-    auto pieces = ShapePieces(shape, paths, SplitOf(arguments));
+    auto pieces = ShapePieces(shape, paths, arguments.split);
     if (!pieces.ok()) {
       const std::string message(pieces.status().message().data(), pieces.status().message().size());
       return absl::Status(pieces.status().code(),
@@ -116,17 +108,6 @@ void WarnOfSwollenPart(const Invocation& run, const RobotPart& part, const HullM
              "decomposition of the mesh, or --split\n";
 }
 
-absl::Status RegisterPart(const Client& client, const RobotPart& part, const std::string& id) {
-  v1::ReplaceOpen open;
-  open.set_hull_id(id);
-  open.set_create_if_absent(true);
-  return client
-      .ReplaceHull(
-          open,
-          [&part](const Client::PointSink& sink) { return SendInMessages(part.hull.xyz, sink); })
-      .status();
-}
-
 // Drops repeated points, which are frequent in a list of triangles.
 void KeepDistinctPoints(std::vector<double>* xyz) {
   std::set<std::array<double, 3>> known;
@@ -138,32 +119,13 @@ void KeepDistinctPoints(std::vector<double>* xyz) {
   xyz->resize(kept);
 }
 
-// A private server, started by the first hull that needs it.
-class HullBuilder {
- public:
-  absl::StatusOr<HullMesh> Build(const RobotPart& part) {
-    if (!client_.has_value()) {
-      HULLD_ASSIGN_OR_RETURN(server_, LocalServer::Start());
-      ClientOptions options;
-      options.server = server_->address();
-      options.own_connection = true;
-      client_.emplace(std::move(options));
-    }
-    HULLD_RETURN_IF_ERROR(RegisterPart(*client_, part, "part"));
-    return client_->GetHullMesh("part");
-  }
-
- private:
-  std::unique_ptr<LocalServer> server_;
-  std::optional<Client> client_;
-};
-
 // Turns the hull of a mesh into an inline shape.
 absl::Status ReduceToVertices(const Invocation& run, HullBuilder* builder, RobotPart* part) {
   KeepDistinctPoints(&part->hull.xyz);
   const bool is_small = part->hull.xyz.size() <= 3 * kMaxShapePoints;
   if (is_small && part->mesh.triangles.empty()) return absl::OkStatus();
-  const auto hull = builder->Build(*part);
+  const auto hull = builder->Build(
+      [part](const Client::PointSink& sink) { return SendInMessages(part->hull.xyz, sink); });
   if (!hull.ok()) {
     if (is_small) return absl::OkStatus();
     return absl::Status(hull.status().code(),
@@ -191,11 +153,14 @@ void AddRobotArguments(Command command, RobotArguments* arguments) {
   command.AddRepeated("--package", &arguments->packages, "Folder of a package; repeatable")
       .ValueName("NAME=DIR");
   command
-      .AddText("--split", &arguments->split,
-               "Split meshes into parts: by names in the file, or by connected components; none: "
-               "one hull per mesh (default: by names, if all parts are convex)")
-      .ValueName("HOW")
-      .OneOf({"names", "components", "none"});
+      .AddChoice("--split",
+                 {{"names", MeshSplit::kNames},
+                  {"components", MeshSplit::kComponents},
+                  {"none", MeshSplit::kNone}},
+                 &arguments->split,
+                 "Split meshes into parts: by names in the file, or by connected components; none: "
+                 "one hull per mesh (default: by names, if all parts are convex)")
+      .ValueName("HOW");
   command
       .AddText("--prefix", &arguments->prefix,
                "Keep the hulls of the links under this prefix, such as arm/ (default: store none)")
@@ -246,7 +211,7 @@ absl::Status PrepareHulls(const Invocation& run, const RobotArguments& arguments
   for (RobotPart& part : model->parts) {
     if (registers) {
       part.hull_id = arguments.prefix + UniqueHullSegment(part.name, &taken);
-      HULLD_RETURN_IF_ERROR(RegisterPart(client, part, part.hull_id));
+      HULLD_RETURN_IF_ERROR(client.PutHull(part.hull_id, part.hull.xyz));
       // Failure to read the hull does not fail the check; the mesh is only compared.
       const auto hull = part.mesh.triangles.empty() ? HullMesh() : client.GetHullMesh(part.hull_id);
       if (hull.ok()) WarnOfSwollenPart(run, part, *hull);

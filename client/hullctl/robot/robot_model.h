@@ -12,6 +12,7 @@
 #include "client/formats/mesh_file.h"
 #include "client/hullctl/command_line/command.h"
 #include "client/hullctl/command_line/invocation.h"
+#include "client/hullctl/robot/mesh_pieces.h"
 #include "client/robot/robot.h"
 #include "client/robot/shape_hull.h"
 #include "client/robot/srdf_file.h"
@@ -23,8 +24,7 @@ struct RobotArguments {
   std::string urdf;
   // NAME=DIR each.
   std::vector<std::string> packages;
-  // Splits meshes into pieces by "names" or "components", or not ("none"). Empty: automatic.
-  std::string split;
+  MeshSplit split = MeshSplit::kAutomatic;
   // ID prefix for registering the hulls of the links. Empty: each query sends them as inline
   // shapes.
   std::string prefix;

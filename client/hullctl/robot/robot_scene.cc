@@ -58,10 +58,10 @@ absl::StatusOr<std::vector<std::vector<double>>> ReadWaypoints(const std::string
   return absl::InvalidArgumentError(absl::StrCat(path, ": contains no waypoints"));
 }
 
-std::vector<Pose7> PosesAt(const RobotModel& model, const std::vector<double>& values) {
+std::vector<RigidPose> PosesAt(const RobotModel& model, const std::vector<double>& values) {
   const std::vector<RigidPose> X_WL =
       LinkPoses(model.robot, kNoMotion, AllJointValues(model.robot, values));
-  std::vector<Pose7> poses;
+  std::vector<RigidPose> poses;
   for (const RobotPart& part : model.parts) {
     poses.push_back(Compose(X_WL[static_cast<size_t>(part.link)], part.X_LS));
   }
@@ -82,7 +82,8 @@ void AddJoints(const std::shared_ptr<const RobotModel>& model, ViewJoints* joint
     }
     joints->joints.push_back({variables[i].name, low, high, start[i]});
   }
-  joints->poses = [model](const std::vector<double>& values) -> absl::StatusOr<std::vector<Pose7>> {
+  joints->poses =
+      [model](const std::vector<double>& values) -> absl::StatusOr<std::vector<RigidPose>> {
     const std::string joint = JointWithoutRotation(model->robot, values);
     if (joint.empty()) return PosesAt(*model, values);
     return absl::InvalidArgumentError(
@@ -108,7 +109,7 @@ void AddParts(RobotModel* model, ViewScene* scene) {
 void PlaceParts(const RobotModel& model, ViewScene* scene) {
   std::vector<double> start;
   for (const ViewJoints::Joint& joint : scene->joints.joints) start.push_back(joint.value);
-  const std::vector<Pose7> poses = PosesAt(model, start);
+  const std::vector<RigidPose> poses = PosesAt(model, start);
   for (size_t i = 0; i < model.parts.size(); ++i) {
     ViewObject& object = scene->objects[i];
     object.hull_id = model.parts[i].hull_id;

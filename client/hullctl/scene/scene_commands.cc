@@ -115,7 +115,7 @@ class SceneSync {
       const HullDefinition& hull = scene_.hulls[i];
       const absl::Status taken = Take({hull.hull_id, false, {}}, hulls[i], changes, [&] {
         const auto xyz = PointsOf(hull);
-        return xyz.ok() ? PutHull(client_, hull.hull_id, *xyz) : xyz.status();
+        return xyz.ok() ? client_.PutHull(hull.hull_id, *xyz) : xyz.status();
       });
       if (!taken.ok()) return run_.Fail(taken);
     }
@@ -268,13 +268,7 @@ ExitCode DeleteScene(const Invocation& run, const SyncArguments& arguments) {
 
 }  // namespace
 
-absl::Status RefuseSecondFile(const std::string& scene_file) {
-  if (scene_file.empty()) return absl::OkStatus();
-  return absl::InvalidArgumentError(
-      absl::StrCat("unexpected argument ", Quoted(scene_file), "; a scene is one file"));
-}
-
-void AddSceneSyncCommands(Command scene, const std::string* scene_file, Invocation* invocation) {
+void AddSceneSyncCommands(Command scene, Invocation* invocation) {
   struct Declared {
     const char* name;
     const char* help;
@@ -321,12 +315,7 @@ void AddSceneSyncCommands(Command scene, const std::string* scene_file, Invocati
     }
     command.SetDetails(absl::StrCat(declared.details, "\n", kYamlHelp));
     command.SetExamples({{"", declared.example}});
-    command.OnGiven([=, act = declared.act] {
-      invocation->action = [=] {
-        const absl::Status alone = RefuseSecondFile(*scene_file);
-        return alone.ok() ? act(*invocation, *arguments) : invocation->FailUsage(alone);
-      };
-    });
+    OnGiven(command, invocation, arguments, declared.act);
   }
 }
 

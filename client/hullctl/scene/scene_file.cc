@@ -304,8 +304,9 @@ v1::Placement Scene::PlacementOf(uint32_t placement) const {
 std::string Scene::NameOf(uint32_t placement) const {
   if (placement < names.size()) return names[placement];
   const std::string* const hull = HullOf(placement);
-  const bool is_shape = hull != nullptr && hull->empty() && PlacementOf(placement).has_points();
-  return absl::StrCat(placement, ":", hull == nullptr ? "" : is_shape ? "points" : *hull);
+  if (hull == nullptr) return absl::StrCat(placement);
+  const bool is_shape = hull->empty() && PlacementOf(placement).has_points();
+  return absl::StrCat(placement, ":", is_shape ? "points" : *hull);
 }
 
 std::array<std::string, 2> Scene::NamesOfPieces(uint32_t a, uint32_t b,
@@ -355,11 +356,12 @@ absl::Status Scene::InKeys(const absl::Status& status) const {
   return renamed;
 }
 
-std::string Scene::ProblemText(const std::string& id, const v1::PlacementProblem& problem) const {
+std::string Scene::ProblemText(uint32_t placement, const v1::PlacementProblem& problem) const {
+  const std::string* const id = HullOf(placement);
   const bool is_missing = problem.code() == static_cast<int>(absl::StatusCode::kNotFound);
-  return absl::StrCat(InKeys(problem.message()), is_missing && defined_ids.contains(id)
-                                                     ? "; 'hullctl scene apply' creates it"
-                                                     : "");
+  const bool is_defined = id != nullptr && defined_ids.contains(*id);
+  return absl::StrCat(InKeys(problem.message()),
+                      is_missing && is_defined ? "; 'hullctl scene apply' creates it" : "");
 }
 
 absl::StatusOr<Scene> ReadScene(ByteSource* source, BodyForm form) {

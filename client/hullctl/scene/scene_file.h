@@ -51,7 +51,8 @@ struct Scene {
   // Returns a placement, in either form. Requires HullOf(placement) != nullptr (unchecked:
   // ReadScene and PairsOf ensure it).
   v1::Placement PlacementOf(uint32_t placement) const;
-  // Returns the placement's name, or its index and hull, as in "0:spider" or "1:points".
+  // Returns the placement's name, or its index and hull, as in "0:spider" or "1:points"; only the
+  // index if it does not exist.
   std::string NameOf(uint32_t placement) const;
   // Returns the file's names for the deciding pieces of two placements, given by their indices;
   // empty if it has none.
@@ -61,9 +62,9 @@ struct Scene {
   // the fields of the contract; unchanged for other scenes.
   std::string InKeys(const std::string& message) const;
   absl::Status InKeys(const absl::Status& status) const;
-  // Returns the message of a problem with a placement of the hull or body `id`, with a remedy if
-  // the file defines it.
-  std::string ProblemText(const std::string& id, const v1::PlacementProblem& problem) const;
+  // Returns the message of a problem with a placement, with a remedy if the file defines its hull
+  // or body.
+  std::string ProblemText(uint32_t placement, const v1::PlacementProblem& problem) const;
 };
 
 // Maximum number of pairs queried from one file.

@@ -13,7 +13,6 @@
 #include "client/formats/point_file.h"
 #include "client/hullctl/scene/yaml_scene.h"
 #include "client/packed_placements.h"
-#include "client/point_messages.h"
 #include "client/status_macros.h"
 
 namespace hulld {
@@ -64,19 +63,10 @@ absl::StatusOr<Change> CompareBody(const Client& client, const BodyDefinition& b
   return same ? Change::kNone : Change::kReplace;
 }
 
-absl::Status PutHull(const Client& client, const std::string& hull_id,
-                     const std::vector<double>& xyz) {
-  v1::ReplaceOpen open;
-  open.set_hull_id(hull_id);
-  open.set_create_if_absent(true);
-  const auto feed = [&xyz](const Client::PointSink& sink) { return SendInMessages(xyz, sink); };
-  return client.ReplaceHull(open, feed).status();
-}
-
 absl::Status PutAll(const Client& client, const SceneDescription& scene) {
   for (const HullDefinition& hull : scene.hulls) {
     HULLD_ASSIGN_OR_RETURN(const auto xyz, PointsOf(hull));
-    HULLD_RETURN_IF_ERROR(PutHull(client, hull.hull_id, xyz));
+    HULLD_RETURN_IF_ERROR(client.PutHull(hull.hull_id, xyz));
   }
   for (const BodyDefinition& body : scene.bodies) {
     HULLD_RETURN_IF_ERROR(client.PutBody(BodyRequest(body)).status());

@@ -29,10 +29,6 @@ absl::StatusOr<Change> Compare(const Client& client, const std::string& hull_id,
 // equal numbers. Read-only.
 absl::StatusOr<Change> CompareBody(const Client& client, const BodyDefinition& body);
 
-// Replaces the hull by the hull of the points, atomically for all readers.
-absl::Status PutHull(const Client& client, const std::string& hull_id,
-                     const std::vector<double>& xyz);
-
 // Replaces all hulls and bodies that the scene defines. Returns the first error, of a definition as
 // in PointsOf or of a call.
 absl::Status PutAll(const Client& client, const SceneDescription& scene);

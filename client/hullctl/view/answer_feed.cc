@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "client/formats/text_number.h"
 #include "client/hullctl/printing/answer_row.h"
 #include "client/hullctl/printing/json.h"
 #include "client/packed_placements.h"
@@ -416,7 +417,7 @@ absl::StatusOr<std::string> AnswerFeed::TolerantAnswer(const Query& query) const
   request.set_tolerance(query.tolerance);
   HULLD_ASSIGN_OR_RETURN(const auto response, client_.CheckCollision(request));
   return JsonObject()
-      .AddJson("tolerance", NumbersJson(&query.tolerance, 1))
+      .AddJson("tolerance", ShortestText(query.tolerance))
       .Add("relation", v1::Relation_Name(response.relation()))
       .Add("rung", v1::Rung_Name(response.rung()))
       .Close();

@@ -18,7 +18,7 @@ constexpr std::chrono::milliseconds kGrowthPause{120};
 constexpr int kGrowthSteps = 200;
 constexpr double kGrownRadius = 6;
 
-Pose7 MovedBy(double x, double y, double z) { return {1, 0, 0, 0, x, y, z}; }
+RigidPose MovedBy(double x, double y, double z) { return {1, 0, 0, 0, x, y, z}; }
 
 v1::PointBlock Cloud(const CloudOptions& cloud) {
   v1::PointBlock points;
@@ -44,7 +44,7 @@ absl::Status SendGrowth(const Client::PointSink& sink) { return sink(GrowthOf(1)
 // vertices. With shift 0, both share exactly that vertex, and the plane of constant x through it
 // separates the rest. Neither doubling a coordinate nor half a turn is rounded, so the contact is
 // exact.
-Pose7 TurnedAbout(const HullMesh& hull, double shift) {
+RigidPose TurnedAbout(const HullMesh& hull, double shift) {
   double sum_x = 0;
   double sum_y = 0;
   size_t extreme = 0;
@@ -83,10 +83,10 @@ class Workshop {
         hulls_->Add(name, [&cloud](const Client::PointSink& sink) { return sink(Cloud(cloud)); }));
   }
   std::string Sprout(const std::string& name) { return Take(hulls_->Add(name, SendGrowth)); }
-  Pose7 TurnedCopy(const std::string& hull_id, double shift) {
+  RigidPose TurnedCopy(const std::string& hull_id, double shift) {
     const auto mesh = client_.GetHullMesh(hull_id);
     if (!mesh.ok()) Note(mesh.status());
-    return mesh.ok() ? TurnedAbout(*mesh, shift) : kIdentityPose;
+    return mesh.ok() ? TurnedAbout(*mesh, shift) : kNoMotion;
   }
 
   const absl::Status& status() const { return status_; }
@@ -108,12 +108,12 @@ class Workshop {
 // Returns a scene of two copies of a model, with its mesh.
 ViewScene TwoCopies(const std::string& title, const std::string& note, const std::string& name,
                     const std::string& hull_id, std::shared_ptr<const FileShape> shape,
-                    const Pose7& pose_b) {
+                    const RigidPose& pose_b) {
   ViewScene scene;
   scene.title = title;
   scene.note = note;
   scene.files = {std::move(shape)};
-  scene.objects = {{name + " A", hull_id, 0, kIdentityPose}, {name + " B", hull_id, 0, pose_b}};
+  scene.objects = {{name + " A", hull_id, 0, kNoMotion}, {name + " B", hull_id, 0, pose_b}};
   return scene;
 }
 
@@ -122,7 +122,7 @@ ViewScene CubeScene(const std::string& cube) {
   scene.title = "Cubes that share a face, an edge, a corner";
   scene.note =
       "Touching is exact: move one by the smallest possible step, and they separate or overlap.";
-  scene.objects = {{"cube", cube, -1, kIdentityPose},
+  scene.objects = {{"cube", cube, -1, kNoMotion},
                    {"shares a face", cube, -1, MovedBy(2, 0, 0)},
                    {"shares an edge", cube, -1, MovedBy(-2, 2, 0)},
                    {"shares a corner", cube, -1, MovedBy(-2, -2, -2)}};
@@ -133,7 +133,7 @@ ViewScene BallScene(const std::string& large, const std::string& small) {
   ViewScene scene;
   scene.title = "Two balls of random points";
   scene.note = "Hulls of 3000 and of 100 points in balls of radius 1, their centers 1.9 apart.";
-  scene.objects = {{"3000 points", large, -1, kIdentityPose},
+  scene.objects = {{"3000 points", large, -1, kNoMotion},
                    {"100 points", small, -1, MovedBy(1.9, 0, 0)}};
   return scene;
 }
@@ -142,7 +142,7 @@ ViewScene GrowingScene(const std::string& live, const std::string& ball) {
   ViewScene scene;
   scene.title = "A live hull grows until it reaches a ball";
   scene.note = "Points stream into the hull while you look. Show the scene again to start over.";
-  scene.objects = {{"live", live, -1, kIdentityPose}, {"ball", ball, -1, MovedBy(6, 0, 0)}};
+  scene.objects = {{"live", live, -1, kNoMotion}, {"ball", ball, -1, MovedBy(6, 0, 0)}};
   return scene;
 }
 
@@ -160,9 +160,9 @@ absl::StatusOr<std::vector<ViewScene>> MakeDemoScenes(const Client& client, Temp
   const std::string ball_3000 = make.Hull("ball3000", {Shape::kBall, 3000, 1, 1, 1, {}});
   const std::string ball_100 = make.Hull("ball100", {Shape::kBall, 100, 2, 1, 1, {}});
   const std::string live = make.Sprout("live");
-  const Pose7 spider_touches = make.TurnedCopy(spider, 0);
-  const Pose7 wuson_touches = make.TurnedCopy(wuson, 0);
-  const Pose7 wuson_overlaps = make.TurnedCopy(wuson, 1e-12);
+  const RigidPose spider_touches = make.TurnedCopy(spider, 0);
+  const RigidPose wuson_touches = make.TurnedCopy(wuson, 0);
+  const RigidPose wuson_overlaps = make.TurnedCopy(wuson, 1e-12);
   if (!make.status().ok()) return make.status();
 
   std::vector<ViewScene> scenes = {

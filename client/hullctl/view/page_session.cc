@@ -41,15 +41,13 @@ v1::WatchHullsRequest WatchFor(const ViewScene& scene) {
 }  // namespace
 
 std::string HelloMessage(const ViewProgram& program) {
-  std::string scenes = "[";
-  for (const ViewScene& scene : program.scenes) {
-    absl::StrAppend(&scenes, scenes.size() > 1 ? "," : "",
-                    JsonObject().Add("key", scene.key).Add("title", scene.title).Close());
-  }
+  const auto scene_json = [](const ViewScene& scene) {
+    return JsonObject().Add("key", scene.key).Add("title", scene.title).Close();
+  };
   return TextMessage("hello", {{"server", QuoteJson(program.server)},
                                {"version", QuoteJson(HULLD_VERSION)},
                                {"up", QuoteJson(program.up)},
-                               {"scenes", scenes + "]"}});
+                               {"scenes", JsonArray(program.scenes, scene_json)}});
 }
 
 PageSession::PageSession(const ViewProgram& program, std::shared_ptr<PageChannel> page)
@@ -171,7 +169,7 @@ void PageSession::TakeHull(uint64_t scene, const v1::HullEvent& event, bool sync
     }
   }
   if (is_new) {
-    const std::vector<ViewObject> objects = {{hull_id, hull_id, -1, kIdentityPose}};
+    const std::vector<ViewObject> objects = {{hull_id, hull_id, -1, kNoMotion}};
     answers_.AddObjects(objects, scene);
     page_->SendText(TextMessage(
         "objects", {{"scene", std::to_string(scene)}, {"objects", ObjectsJson(objects)}}));

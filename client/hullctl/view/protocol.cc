@@ -1,7 +1,6 @@
 #include "client/hullctl/view/protocol.h"
 
 #include <absl/strings/str_cat.h>
-#include <absl/strings/str_join.h>
 
 #include <algorithm>
 #include <bit>
@@ -216,50 +215,31 @@ std::string NumberJson(double number) {
   return std::isfinite(number) ? ShortestText(number) : "null";
 }
 
-std::string NumbersJson(const double* numbers, size_t count) {
-  std::string json = "[";
-  for (size_t i = 0; i < count; ++i) {
-    absl::StrAppend(&json, i > 0 ? "," : "", NumberJson(numbers[i]));
-  }
-  return json + "]";
+std::string NumbersJson(std::span<const double> numbers) { return JsonArray(numbers, NumberJson); }
+
+std::string ObjectsJson(const std::vector<ViewObject>& objects) {
+  return JsonArray(objects, [](const ViewObject& object) {
+    return JsonObject()
+        .Add("name", object.name)
+        .Add("hullId", object.hull_id)
+        .AddJson("file", std::to_string(object.file))
+        .AddJson("pose", NumbersJson(object.pose))
+        .AddJson("radius", NumberJson(object.radius))
+        .AddJson("isJointed", object.is_jointed ? "true" : "false")
+        .AddJson("endPose", object.motion ? NumbersJson(object.motion->end) : "null")
+        .Close();
+  });
 }
 
-std::string ObjectsJson(const std::vector<ViewObject>& objects, size_t from) {
-  std::string json = "[";
-  for (size_t i = from; i < objects.size(); ++i) {
-    const ViewObject& object = objects[i];
-    absl::StrAppend(
-        &json, i > from ? "," : "",
-        JsonObject()
-            .Add("name", object.name)
-            .Add("hullId", object.hull_id)
-            .AddJson("file", std::to_string(object.file))
-            .AddJson("pose", NumbersJson(object.pose.data(), object.pose.size()))
-            .AddJson("radius", NumberJson(object.radius))
-            .AddJson("isJointed", object.is_jointed ? "true" : "false")
-            .AddJson("endPose", object.motion ? PosesJson({object.motion->end}) : "null")
-            .Close());
-  }
-  return json + "]";
-}
-
-std::string PosesJson(const std::vector<Pose7>& poses) {
+std::string PosesJson(const std::vector<RigidPose>& poses) {
   std::vector<double> numbers;
-  for (const Pose7& pose : poses) numbers.insert(numbers.end(), pose.begin(), pose.end());
-  return NumbersJson(numbers.data(), numbers.size());
+  for (const RigidPose& pose : poses) numbers.insert(numbers.end(), pose.begin(), pose.end());
+  return NumbersJson(numbers);
 }
 
 std::string SceneMessage(const ViewScene& scene, uint64_t number) {
-  std::string files = "[";
-  for (size_t i = 0; i < scene.files.size(); ++i) {
-    absl::StrAppend(&files, i > 0 ? "," : "",
-                    JsonObject().Add("name", scene.files[i]->name).Close());
-  }
-  const auto joined = [](const auto& items, const auto& json_of) {
-    return "[" +
-           absl::StrJoin(items, ",",
-                         [&](std::string* out, const auto& item) { out->append(json_of(item)); }) +
-           "]";
+  const auto file_json = [](const auto& file) {
+    return JsonObject().Add("name", file->name).Close();
   };
   const auto joint_json = [](const ViewJoints::Joint& joint) {
     return JsonObject()
@@ -269,22 +249,20 @@ std::string SceneMessage(const ViewScene& scene, uint64_t number) {
         .AddJson("value", NumberJson(joint.value))
         .Close();
   };
-  const auto values_json = [](const std::vector<double>& values) {
-    return NumbersJson(values.data(), values.size());
-  };
+  const auto index_json = [](uint32_t index) { return std::to_string(index); };
   std::span<const uint32_t> named;
   if (scene.pairs) named = std::span(*scene.pairs).first(std::min<size_t>(scene.pairs->size(), 2));
   return TextMessage("scene", {{"number", std::to_string(number)},
                                {"key", QuoteJson(scene.key)},
                                {"title", QuoteJson(scene.title)},
                                {"note", QuoteJson(scene.note)},
-                               {"files", files + "]"},
+                               {"files", JsonArray(scene.files, file_json)},
                                {"objects", ObjectsJson(scene.objects)},
-                               {"joints", joined(scene.joints.joints, joint_json)},
-                               {"waypoints", joined(scene.joints.waypoints, values_json)},
-                               {"contacts", "[" + absl::StrJoin(scene.joints.contacts, ",") + "]"},
-                               {"named", "[" + absl::StrJoin(named, ",") + "]"},
-                               {"watch", "[" + absl::StrJoin(scene.watch, ",") + "]"}});
+                               {"joints", JsonArray(scene.joints.joints, joint_json)},
+                               {"waypoints", JsonArray(scene.joints.waypoints, NumbersJson)},
+                               {"contacts", JsonArray(scene.joints.contacts, index_json)},
+                               {"named", JsonArray(named, index_json)},
+                               {"watch", JsonArray(scene.watch)}});
 }
 
 std::string HullFrame(const std::string& hull_id, const HullMesh& mesh) {
@@ -292,21 +270,18 @@ std::string HullFrame(const std::string& hull_id, const HullMesh& mesh) {
 }
 
 std::string BodyFrame(const v1::GetBodyResponse& body) {
-  std::string pieces = "[";
-  for (const v1::Placement& piece : body.pieces()) {
-    const RigidPose pose = NumbersOf(piece.pose());
-    absl::StrAppend(&pieces, pieces.size() > 1 ? "," : "",
-                    JsonObject()
-                        .Add("hullId", piece.hull_id())
-                        .AddJson("pose", NumbersJson(pose.data(), pose.size()))
-                        .AddJson("radius", NumberJson(piece.radius()))
-                        .Close());
-  }
+  const auto piece_json = [](const v1::Placement& piece) {
+    return JsonObject()
+        .Add("hullId", piece.hull_id())
+        .AddJson("pose", NumbersJson(NumbersOf(piece.pose())))
+        .AddJson("radius", NumberJson(piece.radius()))
+        .Close();
+  };
   return StartFrame(JsonObject()
                         .Add("kind", "body")
                         .Add("hullId", body.body().body_id())
                         .AddJson("info", MessageJson(body.body()))
-                        .AddJson("pieces", pieces + "]")
+                        .AddJson("pieces", JsonArray(body.pieces(), piece_json))
                         .Close(),
                     0);
 }

@@ -7,6 +7,7 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -81,14 +82,14 @@ namespace hulld {
 //
 // A recording, for a page without a bridge, is {hello, scene, frames: [base64], motions: [motion],
 // states: [{time, poses, collisions, answers: [answer]}]}: the state at the start, at each
-// waypoint, or at several times of the motions, among them those of all first contacts.
+// waypoint, or at several times of the motions, among them all contact times.
 
 // A parsed message of the page.
 struct ViewQuery {
   uint64_t scene = 0;
   uint64_t update = 0;
   std::vector<uint32_t> objects;
-  std::vector<Pose7> poses;
+  std::vector<RigidPose> poses;
   std::optional<std::pair<uint32_t, uint32_t>> pair;
   double tolerance = 0;
   bool certificate = false;
@@ -119,12 +120,12 @@ std::string TextMessage(const std::string& type,
                         const std::vector<std::pair<std::string, std::string>>& members);
 
 std::string ProblemMessage(const std::string& message);
-std::string ObjectsJson(const std::vector<ViewObject>& objects, size_t from = 0);
+std::string ObjectsJson(const std::vector<ViewObject>& objects);
 // `number` counts the scenes shown to the page.
 std::string SceneMessage(const ViewScene& scene, uint64_t number);
 
 // Returns the numbers of poses, one after the other.
-std::string PosesJson(const std::vector<Pose7>& poses);
+std::string PosesJson(const std::vector<RigidPose>& poses);
 
 // Return frames.
 std::string HullFrame(const std::string& hull_id, const HullMesh& mesh);
@@ -133,9 +134,8 @@ std::string SimplifiedFrame(const v1::GetHullMeshRequest& request, const HullMes
 std::string MeshFrame(uint32_t file, const FileShape& shape);
 std::string MissingFrame(const ShapeRequest& shape, const std::string& message);
 
-// Returns "[1,2.5]": numbers that read back as the same doubles. Requires finite numbers; others
-// become null.
-std::string NumbersJson(const double* numbers, size_t count);
+// Returns "[1,2.5]": numbers that read back as the same doubles. Infinities and NaN become null.
+std::string NumbersJson(std::span<const double> numbers);
 
 }  // namespace hulld
 

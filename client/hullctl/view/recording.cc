@@ -1,7 +1,6 @@
 #include "client/hullctl/view/recording.h"
 
 #include <absl/strings/escaping.h>
-#include <absl/strings/str_cat.h>
 
 #include <algorithm>
 #include <set>
@@ -20,10 +19,10 @@ namespace {
 
 // Returns a frame for each file, hull, and body of the scene, and for each hull of a body.
 std::string AllFrames(const Client& client, const ViewScene& scene) {
-  std::string frames = "[";
+  std::vector<std::string> frames;
   const auto add = [&](const ShapeRequest& shape, std::vector<std::string>* pieces) {
     const std::string frame = FrameFor(client, scene.files, shape, pieces);
-    absl::StrAppend(&frames, frames.size() > 1 ? "," : "", QuoteJson(absl::Base64Escape(frame)));
+    frames.push_back(QuoteJson(absl::Base64Escape(frame)));
   };
   for (uint32_t file = 0; file < scene.files.size(); ++file) {
     ShapeRequest shape;
@@ -39,7 +38,7 @@ std::string AllFrames(const Client& client, const ViewScene& scene) {
     shape.hull_id = wanted[i];
     add(shape, &wanted);
   }
-  return frames + "]";
+  return JsonArray(frames);
 }
 
 // Returns the answer with its certificate; without it for bodies of so many pieces that no message
@@ -53,7 +52,7 @@ absl::StatusOr<v1::CheckCollisionResponse> Proven(const Client& client,
 }
 
 absl::StatusOr<std::string> AllPairs(const Client& client, const std::vector<ViewObject>& objects) {
-  std::string answers = "[";
+  std::vector<std::string> answers;
   for (uint32_t a = 0; a < objects.size(); ++a) {
     for (uint32_t b = a + 1; b < objects.size(); ++b) {
       if (objects[a].hull_id.empty() || objects[b].hull_id.empty()) continue;
@@ -61,32 +60,30 @@ absl::StatusOr<std::string> AllPairs(const Client& client, const std::vector<Vie
         return PairRequest(objects[a], objects[b], certificate);
       };
       HULLD_ASSIGN_OR_RETURN(const auto response, Proven(client, request_with));
-      absl::StrAppend(&answers, answers.size() > 1 ? "," : "",
-                      PairAnswerJson({a, b}, objects[a], objects[b], 0, response));
+      answers.push_back(PairAnswerJson({a, b}, objects[a], objects[b], 0, response));
     }
   }
-  return answers + "]";
+  return JsonArray(answers);
 }
 
 // Returns the messages `motion` of all pairs that move, and adds the ends of their brackets to
 // `times`.
 std::string AllMotions(const Client& client, const std::vector<ViewObject>& objects,
                        std::set<double>* times) {
-  std::string motions = "[";
+  std::vector<std::string> motions;
   for (uint32_t a = 0; a < objects.size(); ++a) {
     for (uint32_t b = a + 1; b < objects.size(); ++b) {
       if (!MotionRequest(objects[a], objects[b], false)) continue;
       const auto response = Proven(client, [&](bool certificate) {
         return *MotionRequest(objects[a], objects[b], certificate);
       });
-      absl::StrAppend(&motions, motions.size() > 1 ? "," : "",
-                      MotionAnswerJson({a, b}, objects[a], objects[b], 0, response));
+      motions.push_back(MotionAnswerJson({a, b}, objects[a], objects[b], 0, response));
       if (!response.ok() || !response->first_contact().has_contact_time()) continue;
       times->insert(response->first_contact().separated_until());
       times->insert(response->first_contact().contact_time());
     }
   }
-  return motions + "]";
+  return JsonArray(motions);
 }
 
 // Returns the poses of the jointed objects, and the answers about all of them.
@@ -97,7 +94,7 @@ absl::StatusOr<std::string> State(const Client& client, const ViewScene& scene,
                          SceneAnswerJson(client, scene.rules, scene.pairs, objects, 0, 0));
   HULLD_ASSIGN_OR_RETURN(const auto answers,
                          AllPairs(client, with_answers ? objects : std::vector<ViewObject>()));
-  std::vector<Pose7> poses;
+  std::vector<RigidPose> poses;
   for (const ViewObject& object : objects) {
     if (object.is_jointed) poses.push_back(object.pose);
   }
@@ -121,7 +118,7 @@ absl::StatusOr<std::string> AllStates(const Client& client, const ViewScene& sce
   std::vector<ViewObject> objects = scene.objects;
   const size_t count = std::max(times.size(), scene.joints.waypoints.size());
   const bool with_answers = count * PairCount(scene) <= kMaxRecordedAnswers;
-  std::string states = "[";
+  std::vector<std::string> states;
   for (size_t i = 0; i < count; ++i) {
     const double time = i < times.size() ? times[i] : 0;
     for (ViewObject& object : objects) {
@@ -135,9 +132,9 @@ absl::StatusOr<std::string> AllStates(const Client& client, const ViewScene& sce
       }
     }
     HULLD_ASSIGN_OR_RETURN(const auto state, State(client, scene, objects, time, with_answers));
-    absl::StrAppend(&states, i > 0 ? "," : "", state);
+    states.push_back(state);
   }
-  return states + "]";
+  return JsonArray(states);
 }
 
 }  // namespace

@@ -15,6 +15,7 @@ namespace hulld {
 namespace {
 
 constexpr size_t kPrefixBytes = 6;
+
 }  // namespace
 
 TemporaryHulls::~TemporaryHulls() {
@@ -36,17 +37,14 @@ absl::StatusOr<std::string> TemporaryHulls::AddFile(const std::string& path) {
   });
 }
 
-absl::StatusOr<std::string> TemporaryHulls::Add(
-    const std::string& name, const std::function<absl::Status(const Client::PointSink&)>& feed) {
+absl::StatusOr<std::string> TemporaryHulls::Add(const std::string& name,
+                                                const Client::PointFeed& feed) {
   if (prefix_.empty()) {
     HULLD_ASSIGN_OR_RETURN(const auto random, RandomHex(kPrefixBytes));
     prefix_ = absl::StrCat("view/", random, "/");
   }
   const std::string id = prefix_ + HullSegment(name);
-  v1::ReplaceOpen open;
-  open.set_hull_id(id);
-  open.set_create_if_absent(true);
-  HULLD_ASSIGN_OR_RETURN(const auto replaced, client_.ReplaceHull(open, feed));
+  HULLD_RETURN_IF_ERROR(client_.PutHull(id, feed));
   if (std::find(ids_.begin(), ids_.end(), id) == ids_.end()) ids_.push_back(id);
   return id;
 }

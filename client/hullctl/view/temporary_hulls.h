@@ -3,7 +3,6 @@
 
 #include <absl/status/statusor.h>
 
-#include <functional>
 #include <string>
 #include <vector>
 
@@ -23,8 +22,7 @@ class TemporaryHulls {
   // Creates the hull of all finite points of a file. Returns its ID.
   absl::StatusOr<std::string> AddFile(const std::string& path);
   // Creates the hull of the points from `feed`. Replaces an existing hull of that name.
-  absl::StatusOr<std::string> Add(
-      const std::string& name, const std::function<absl::Status(const Client::PointSink&)>& feed);
+  absl::StatusOr<std::string> Add(const std::string& name, const Client::PointFeed& feed);
 
  private:
   const Client& client_;

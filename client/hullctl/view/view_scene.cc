@@ -57,8 +57,8 @@ absl::Status ReadPointShape(const std::string& path, PointFormat format, FileSha
 
 }  // namespace
 
-Pose7 PoseAt(const ViewMotion& motion, double t) {
-  Pose7 pose;
+RigidPose PoseAt(const ViewMotion& motion, double t) {
+  RigidPose pose;
   for (size_t i = 0; i < pose.size(); ++i) {
     pose[i] = (1 - t) * motion.start[i] + t * motion.end[i];
   }
@@ -139,7 +139,7 @@ absl::Status AddHullsAndBodies(const Client& client, const std::string& id_or_pr
   }
   std::sort(ids.begin(), ids.end());
   const auto add = [scene](const std::string& id) {
-    scene->objects.push_back({id, id, -1, kIdentityPose});
+    scene->objects.push_back({id, id, -1, kNoMotion});
   };
   if (std::binary_search(ids.begin(), ids.end(), id_or_prefix)) {
     add(id_or_prefix);

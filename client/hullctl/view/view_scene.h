@@ -3,7 +3,6 @@
 
 #include <absl/status/statusor.h>
 
-#include <array>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -13,13 +12,10 @@
 
 #include "client/client.h"
 #include "client/formats/mesh_file.h"
+#include "client/pose/rigid_pose.h"
 #include "hulld/v1/collision.pb.h"
 
 namespace hulld {
-
-// Quaternion w x y z, translation x y z; as in Pose of the contract.
-using Pose7 = std::array<double, 7>;
-inline constexpr Pose7 kIdentityPose = {1, 0, 0, 0, 0, 0, 0};
 
 // The shape of a file: a mesh, or points alone.
 struct FileShape {
@@ -37,12 +33,12 @@ inline constexpr uint64_t kMaxDrawnPoints = 2'000'000;
 
 // A motion over the time t in [0, 1], as of a Placement with an end pose.
 struct ViewMotion {
-  Pose7 start = kIdentityPose;
-  Pose7 end = kIdentityPose;
+  RigidPose start = kNoMotion;
+  RigidPose end = kNoMotion;
 };
 
 // Returns the pose at time t, rounded: each number is (1 - t) start + t end, as in page/pose.js.
-Pose7 PoseAt(const ViewMotion& motion, double t);
+RigidPose PoseAt(const ViewMotion& motion, double t);
 
 // A displayed object: a hull or a body at a pose, a file, or a file with its hull.
 struct ViewObject {
@@ -51,7 +47,7 @@ struct ViewObject {
   std::string hull_id;
   // Index into ViewScene::files, -1: none.
   int file = -1;
-  Pose7 pose = kIdentityPose;
+  RigidPose pose = kNoMotion;
   // Placement.radius.
   double radius = 0;
   // FileShape::hull of its file; null for an ID.
@@ -74,7 +70,7 @@ struct ViewJoints {
   std::vector<Joint> joints;
   // Returns the poses of the jointed objects, in order, for a finite value of each joint.
   // INVALID_ARGUMENT: the values are not a configuration.
-  std::function<absl::StatusOr<std::vector<Pose7>>(const std::vector<double>& values)> poses;
+  std::function<absl::StatusOr<std::vector<RigidPose>>(const std::vector<double>& values)> poses;
   // Values of the joints at each waypoint.
   std::vector<std::vector<double>> waypoints;
   // Waypoints with a colliding pair, ascending.

@@ -384,8 +384,7 @@ class Client(ClientBase):
         to_a, to_b: end poses of motions (hulld.Placement). The answer then has first_contact, and
         certificate is the only option above that is allowed. max_time_error: the maximum width of
         its bracket. resolution: allows WITHIN_TOLERANCE if the least separation of a rotating
-        motion
-        is at most this.
+        motion is at most this.
 
         NotFoundError: no such hull. InvalidArgumentError: incompatible options.
         """

@@ -10,27 +10,6 @@ from google.protobuf.message import DecodeError
 
 from hulld.rpc import error_details_pb2
 
-#: gRPC's status codes, by number.
-STATUS_NAMES = (
-    "OK",
-    "CANCELLED",
-    "UNKNOWN",
-    "INVALID_ARGUMENT",
-    "DEADLINE_EXCEEDED",
-    "NOT_FOUND",
-    "ALREADY_EXISTS",
-    "PERMISSION_DENIED",
-    "RESOURCE_EXHAUSTED",
-    "FAILED_PRECONDITION",
-    "ABORTED",
-    "OUT_OF_RANGE",
-    "UNIMPLEMENTED",
-    "INTERNAL",
-    "UNAVAILABLE",
-    "DATA_LOSS",
-    "UNAUTHENTICATED",
-)
-
 D = TypeVar("D")
 T = TypeVar("T")
 
@@ -180,30 +159,14 @@ class UnauthenticatedError(HulldError):
     code = "UNAUTHENTICATED"
 
 
-_CLASSES: dict[str, type[HulldError]] = {
-    kind.code: kind
-    for kind in (
-        CancelledError,
-        InvalidArgumentError,
-        DeadlineExceededError,
-        NotFoundError,
-        AlreadyExistsError,
-        PermissionDeniedError,
-        ResourceExhaustedError,
-        FailedPreconditionError,
-        AbortedError,
-        UnimplementedError,
-        InternalError,
-        UnavailableError,
-        DataLossError,
-        UnauthenticatedError,
-    )
-}
+_CLASSES = {kind.code: kind for kind in HulldError.__subclasses__()}
 
 
 def status_name(code: int) -> str:
     """The name of a status code."""
-    return STATUS_NAMES[code] if 0 <= code < len(STATUS_NAMES) else "UNKNOWN"
+    import grpc
+
+    return next((status.name for status in grpc.StatusCode if status.value[0] == code), "UNKNOWN")
 
 
 def error_class(code: str) -> type[HulldError]:

@@ -13,12 +13,13 @@ from hulld.v1 import collision_pb2, geometry_pb2, hull_pb2
 from hulld.wire import (
     MessageWriter,
     WireError,
+    encode_varints,
     named_arrays,
     packed_doubles,
     packed_varints,
     read_fields,
 )
-from hulld.wire.fields import encode_varints
+
 
 # Each length of a varint, and both sides of each step.
 STEPS = sorted(

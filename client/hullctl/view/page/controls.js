@@ -21,58 +21,47 @@ export class Controls {
         model.tell('shown');
       });
     }
-    $('fit').addEventListener('click', () => viewer.fit());
-    $('theme').addEventListener(
-        'click', () => viewer.setTheme(viewer.theme === 'dark' ? 'light' : 'dark'));
-    $('help').addEventListener('click', () => $('keys').showModal());
+    const actions = {
+      fit: () => viewer.fit(),
+      theme: () => viewer.setTheme(viewer.theme === 'dark' ? 'light' : 'dark'),
+      help: () => $('keys').showModal(),
+      'mode-move': () => this.mode('translate'),
+      'mode-turn': () => this.mode('rotate'),
+      'mode-reset': () => this.reset(),
+      undo: () => model.undo(),
+      orthographic: () => this.setOrthographic(!stage.isOrthographic),
+      measure: () => this.toggleRuler(),
+      save: () => savePicture(stage, 'hulld.png'),
+    };
+    for (const [id, act] of Object.entries(actions)) $(id).addEventListener('click', act);
     $('scene-choice').addEventListener('change', ({target}) => {
       this.connection.send({type: 'show', key: target.value});
       $('canvas').focus();
     });
-    $('mode-move').addEventListener('click', () => this.mode('translate'));
-    $('mode-turn').addEventListener('click', () => this.mode('rotate'));
-    $('mode-reset').addEventListener('click', () => this.reset());
-    $('undo').addEventListener('click', () => model.undo());
     for (const button of document.querySelectorAll('[data-view]')) {
       button.addEventListener('click', () => viewer.fit(button.dataset.view));
     }
-    $('orthographic').addEventListener('click', () => this.setOrthographic(!stage.isOrthographic));
-    $('measure').addEventListener('click', () => this.toggleRuler());
-    $('save').addEventListener('click', () => this.save());
     for (const tab of document.querySelectorAll('.tabs button')) {
       tab.addEventListener('click', () => this.showPanel(tab.dataset.panel));
     }
     this.showPanel('answer');
     this.bindPicking();
     bindKeys({
-      fit: () => viewer.fit(),
-      flyToSelected: () =>
-          model.selected !== null && model.tell('fly', [model.objects[model.selected]]),
+      flyToSelected: () => model.object && model.tell('fly', [model.object]),
       step: (by) => this.step(by),
       nextOther: () => this.nextOther(),
       nextCollision: () => this.nextCollision(),
       deselect: () => (this.ruler.on ? this.toggleRuler() : model.select(null)),
       mode: (mode) => this.mode(mode),
-      reset: () => this.reset(),
-      undo: () => model.undo(),
-      view: (name) => viewer.fit(name),
-      orthographic: () => this.setOrthographic(!stage.isOrthographic),
-      measure: () => this.toggleRuler(),
-      save: () => this.save(),
-      show: (key) => $(`show-${key}`).click(),
       toggleVisible: () => this.toggleVisible(),
       search: () => {
         this.showPanel('objects');
         $('search').focus();
       },
-      theme: () => $('theme').click(),
-      help: () => $('keys').showModal(),
       pan: (x, y) => stage.pan(x, y),
       orbit: (around, over) => stage.orbit(around, over),
       zoom: (factor) => stage.zoom(factor),
       nudge: (axis, steps) => this.connection.live && this.gizmo.nudge(axis, steps),
-      play: () => viewer.timeLine.play(),
-      contact: () => viewer.motion.goToContact(),
       scene: (key) => viewer.scenes?.length > 1 && this.connection.send({type: 'show', key}),
     });
   }
@@ -102,7 +91,7 @@ export class Controls {
   }
 
   updateTools() {
-    const object = this.model.selected === null ? null : this.model.objects[this.model.selected];
+    const {object} = this.model;
     const can = Boolean(object?.hullId) && this.connection.live && !object.isDriven;
     for (const [id, mode] of [['mode-move', 'translate'], ['mode-turn', 'rotate']]) {
       $(id).disabled = !can;
@@ -138,25 +127,19 @@ export class Controls {
     $('measure').setAttribute('aria-pressed', String(this.ruler.on));
   }
 
-  save() {
-    savePicture(this.stage, 'hulld.png');
-  }
-
   mode(mode) {
     this.gizmo.setMode(mode);
     this.updateTools();
   }
 
   reset() {
-    const object = this.model.objects[this.model.selected];
+    const {object} = this.model;
     if (object && !object.isDriven) this.model.setPose(object.index, object.start, true);
   }
 
   toggleVisible() {
-    const object = this.model.objects[this.model.selected];
-    if (!object) return;
-    object.visible = !object.visible;
-    this.model.tell('visibility');
+    const {object} = this.model;
+    if (object) this.model.setVisible([object], !object.visible);
   }
 
   step(by) {

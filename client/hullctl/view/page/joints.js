@@ -1,12 +1,10 @@
 // The joints of a robot, and the timeline of its trajectory: the configuration between two
 // waypoints is interpolated linearly in each joint.
 import {JointPanel} from 'hulld/panels/joint_panel.js';
-import {runsOf} from 'hulld/panels/time_line.js';
+import {playTime, runsOf} from 'hulld/panels/time_line.js';
 
-// Time from one waypoint to the next while playing, within limits for the whole.
+// Time from one waypoint to the next while playing.
 const WAYPOINT_MS = 600;
-const MIN_MS = 3000;
-const MAX_MS = 30000;
 // Steps of the slider between two waypoints. A recording has only the waypoints.
 const STEPS = 16;
 
@@ -32,7 +30,7 @@ export class Joints {
     return {
       last,
       steps: this.connection.live ? STEPS : 1,
-      length: Math.min(Math.max(WAYPOINT_MS * last, MIN_MS), MAX_MS),
+      length: playTime(last, WAYPOINT_MS),
       marks: () => runsOf(contacts),
       text: (moment) => `${Number((moment + 1).toFixed(2))} of ${last + 1}`,
       show: (moment, rest) => {

@@ -44,6 +44,10 @@ class Viewer {
     this.moved = new Set();
     // Requested hulls that have not arrived yet.
     this.awaited = new Set();
+    // The previous shapes of objects whose new vertices will flash, by index.
+    this.former = new Map();
+    // Work that runs before the next frame, by name.
+    this.waiting = new Map();
     this.connection = connect({
       hello: (message) => this.hello(message),
       scene: (message) => this.scene(message),
@@ -81,11 +85,7 @@ class Viewer {
     model.on('selection', () => {
       this.mayChoosePair = false;
       this.shell.clear();
-      this.rebuildViews();
-      this.gizmo.update();
-      this.marks.rebuild();
-      this.labels.rebuild();
-      this.tree.rebuild();
+      this.rebuildObjects();
       this.answerPanel.rebuild();
       this.objectPanel.rebuild();
       this.controls.updateTools();
@@ -110,13 +110,7 @@ class Viewer {
       this.objectPanel.rebuild();
       this.updateStatus();
     });
-    model.on('visibility color shown', () => {
-      this.rebuildViews();
-      this.gizmo.update();
-      this.marks.rebuild();
-      this.labels.rebuild();
-      this.tree.rebuild();
-    });
+    model.on('visibility color shown', () => this.rebuildObjects());
     model.on('collisions', (changed) => {
       this.answerPanel.updateCollisions();
       if (this.mayChoosePair) this.chooseCollidingPair();
@@ -166,7 +160,7 @@ class Viewer {
     document.body.dataset.scene = message.key;
     this.moved = new Set(model.objects.map(({index}) => index));
     this.awaited.clear();
-    this.former = new Map();
+    this.former.clear();
     this.fitted = false;
     this.ruler.forget();
     // Answers to earlier queries concern another scene.
@@ -213,18 +207,21 @@ class Viewer {
     if (this.watch.ownsHulls) return;
     const gone = kind === 'HULL_EVENT_KIND_DELETED';
     model.info.set(hull.hullId, gone ? undefined : hull);
-    for (const object of model.objects) {
-      if (object.hullId === hull.hullId && object.gone !== gone) {
-        object.gone = gone;
-        this.soon('gone', () => model.tell('visibility'));
-      }
-    }
+    this.setGone(hull.hullId, gone);
     this.updateStatus(hull.revision);
     if (!gone) {
       this.fetchIfOlder(hull.hullId);
     } else if (model.bodiesWith(hull.hullId).length) {
       model.setHull(hull.hullId, null);
       this.geometryChanged();
+    }
+  }
+
+  setGone(id, gone) {
+    for (const object of this.model.objects) {
+      if (object.hullId !== id || object.gone === gone) continue;
+      object.gone = gone;
+      this.soon('gone', () => this.model.tell('visibility'));
     }
   }
 
@@ -252,11 +249,13 @@ class Viewer {
     } else {
       this.frameMissing(frame.head);
     }
-    if (model.isCrowd) {
-      if (this.awaited.size === 0) this.geometryChanged();
-    } else {
-      this.geometryChanged();
-    }
+    if (!model.isCrowd || this.awaited.size === 0) this.geometryChanged();
+  }
+
+  arrived(id, {revision}) {
+    this.awaited.delete(id);
+    this.fetchIfOlder(id);
+    this.updateStatus(revision);
   }
 
   hullCame(hull, id) {
@@ -264,16 +263,13 @@ class Viewer {
     if (model.hulls.has(id) && !model.isNameless) this.keepForFlash(id);
     const wasAbsent = model.absent.has(id);
     model.setHull(id, hull);
-    this.awaited.delete(id);
-    this.fetchIfOlder(id);
-    this.updateStatus(hull.revision);
+    this.arrived(id, hull);
     if (wasAbsent) this.soon('tree', () => this.tree.rebuild());
   }
 
   // Keeps the previous shape of objects with this hull, so that new vertices flash after the views
   // are rebuilt.
   keepForFlash(id) {
-    this.former ??= new Map();
     for (const object of this.model.objects) {
       const isConcerned = object.hullId === id || this.model.bodyOf(object)?.hullIds.has(id);
       const shape = isConcerned && !this.former.has(object.index) && this.model.hullOf(object);
@@ -285,9 +281,7 @@ class Viewer {
   bodyCame(body, id) {
     const {model} = this;
     model.setBody(id, body);
-    this.awaited.delete(id);
-    this.fetchIfOlder(id);
-    this.updateStatus(body.revision);
+    this.arrived(id, body);
     this.fetchHulls([...body.hullIds].filter((piece) => !model.hulls.has(piece)));
     this.soon('tree', () => this.tree.rebuild());
   }
@@ -305,12 +299,7 @@ class Viewer {
     }
     const known = this.model.info.get(head.hullId);
     if (known || isPiece || head.file !== undefined) this.say(head.message);
-    for (const object of this.model.objects) {
-      if (object.hullId === head.hullId && head.hullId) {
-        object.gone = true;
-        this.soon('gone', () => this.model.tell('visibility'));
-      }
-    }
+    if (head.hullId) this.setGone(head.hullId, true);
   }
 
   // Called when new shapes have arrived.
@@ -322,7 +311,7 @@ class Viewer {
       this.rebuildGround();
       const bounds = model.bounds();
       if (this.fitted && bounds) this.stage.keepInView(bounds);
-      for (const [index, before] of this.former || []) {
+      for (const [index, before] of this.former) {
         const shape = model.hullOf(model.objects[index]);
         // Waits until all pieces of a body have arrived.
         if (!shape) continue;
@@ -482,6 +471,15 @@ class Viewer {
     stage.draw();
   }
 
+  // Rebuilds everything drawn or listed for each object.
+  rebuildObjects() {
+    this.rebuildViews();
+    this.gizmo.update();
+    this.marks.rebuild();
+    this.labels.rebuild();
+    this.tree.rebuild();
+  }
+
   rebuildGround() {
     this.ground.rebuild(this.fitted ? this.model.bounds() : null);
   }
@@ -498,7 +496,6 @@ class Viewer {
 
   // Runs `work` once before the next frame, regardless of the number of calls.
   soon(name, work) {
-    this.waiting ??= new Map();
     if (this.waiting.size === 0) {
       setTimeout(() => {
         const works = [...this.waiting.values()];

@@ -3,6 +3,8 @@
 import {CROWD_COLOR, OBJECT_COLORS} from 'hulld/palette.js';
 import {IDENTITY, poseAt, samePose, toWorld} from 'hulld/pose.js';
 import {RoundedShape} from 'hulld/rounded_shape.js';
+import {boxOf} from 'hulld/shape.js';
+import {difference} from 'hulld/vector.js';
 
 // Maximum number of objects drawn individually; more are drawn as a crowd, in few draw calls.
 const MAX_SINGLE_OBJECTS = 24;
@@ -19,7 +21,7 @@ const MAX_PIECE_PAIRS = 1000;
 // Number of times at which a moving object must be inside the picture.
 const PATH_TIMES = [0, 0.25, 0.5, 0.75, 1];
 
-// Shapes with more vertices than this, and those of a crowd, are represented by their box.
+// Shapes with more vertices, and the shapes of a crowd, are represented by their box.
 const MAX_CORNERS = 300;
 
 export class Model extends EventTarget {
@@ -107,6 +109,11 @@ export class Model extends EventTarget {
         color: many ? CROWD_COLOR : OBJECT_COLORS[index % OBJECT_COLORS.length],
       });
     }
+  }
+
+  // Returns the selected object; undefined if none is selected.
+  get object() {
+    return this.objects[this.selected];
   }
 
   get moving() {
@@ -223,6 +230,11 @@ export class Model extends EventTarget {
     return object.visible && !object.gone;
   }
 
+  setVisible(objects, visible) {
+    for (const object of objects) object.visible = visible;
+    this.tell('visibility');
+  }
+
   // Returns the center of an object's box in the world, in double.
   centerOf(object) {
     const shape = this.shapeOf(object);
@@ -262,26 +274,11 @@ export class Model extends EventTarget {
   bounds(objects = this.objects, now = false) {
     const posesOf = (object) => now || !object.endPose ? [object.pose] : this.posesOnPath(object);
     const corners =
-        objects
-            .filter(
-                (object) =>
-                    this.isShown(object) && this.shapeOf(object) && !this.shapeOf(object).isEmpty)
+        objects.filter((object) => this.isShown(object) && this.shapeOf(object)?.isEmpty === false)
             .flatMap((object) => posesOf(object).flatMap((pose) => this.cornersOf(object, pose)));
     if (!corners.length) return null;
-    const low = [Infinity, Infinity, Infinity];
-    const high = [-Infinity, -Infinity, -Infinity];
-    for (const corner of corners) {
-      for (let k = 0; k < 3; ++k) {
-        low[k] = Math.min(low[k], corner[k]);
-        high[k] = Math.max(high[k], corner[k]);
-      }
-    }
-    const center = low.map((value, k) => value / 2 + high[k] / 2);
-    return {
-      center,
-      radius: Math.hypot(...high.map((value, k) => value - low[k])) / 2 || 1,
-      corners
-    };
+    const {low, high, center} = boxOf(corners.flat());
+    return {center, radius: Math.hypot(...difference(high, low)) / 2 || 1, corners};
   }
 
   select(index, other = undefined) {
@@ -309,9 +306,8 @@ export class Model extends EventTarget {
     let least = Infinity;
     for (const candidate of this.objects) {
       if (candidate === object || !candidate.hullId || candidate.gone) continue;
-      const c = this.centerOf(candidate);
-      const gap = Math.hypot(c[0] - center[0], c[1] - center[1], c[2] - center[2]) -
-          this.radiusOf(candidate);
+      const gap =
+          Math.hypot(...difference(this.centerOf(candidate), center)) - this.radiusOf(candidate);
       if (gap < least) [nearest, least] = [candidate.index, gap];
     }
     return nearest;

@@ -20,10 +20,6 @@ export function rotate([w, x, y, z], [px, py, pz]) {
   ];
 }
 
-export function rotateBack([w, x, y, z], p) {
-  return rotate([w, -x, -y, -z], p);
-}
-
 // Transforms a point from the object's frame to the world.
 export function toWorld(pose, p) {
   const [x, y, z] = rotate(unitQuaternion(pose), p);

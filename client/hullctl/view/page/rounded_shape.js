@@ -2,6 +2,7 @@
 import {directions, extremeVertex, fewVertices, hullTriangles} from 'hulld/drawing/convex_hull.js';
 import {toWorld} from 'hulld/pose.js';
 import {Shape} from 'hulld/shape.js';
+import {cross, difference} from 'hulld/vector.js';
 
 // Directions in which the surface of a hull is sampled, and those of all hulls of a scene.
 const MAX_DIRECTIONS = 400;
@@ -13,8 +14,7 @@ const MAX_TRIANGLES = 100;
 const MAX_VERTICES = 300;
 
 function normalOf([a, b, c]) {
-  const [u, v] = [b, c].map((p) => p.map((value, k) => value - a[k]));
-  const n = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+  const n = cross(difference(b, a), difference(c, a));
   const length = Math.hypot(...n) || 1;
   return n.map((value) => value / length);
 }
@@ -57,7 +57,6 @@ export class RoundedShape extends Shape {
     // [{hull: {xyz}, pose}].
     this.parts = rounded;
     this.center = center;
-    this.radius =
-        Math.max(...points.map((p) => Math.hypot(...p.map((value, k) => value - center[k]))));
+    this.radius = Math.max(...points.map((p) => Math.hypot(...difference(p, center))));
   }
 }

@@ -2,7 +2,8 @@
 // relative to the shape's center, so that distant shapes do not jitter.
 import {toWorld} from 'hulld/pose.js';
 
-function boxOf(xyz) {
+// Returns {low, high, center} of points x y z x y z ...; the center of none is the origin.
+export function boxOf(xyz) {
   const low = [Infinity, Infinity, Infinity];
   const high = [-Infinity, -Infinity, -Infinity];
   for (let i = 0; i < xyz.length; ++i) {
@@ -10,7 +11,8 @@ function boxOf(xyz) {
     if (xyz[i] < low[k]) low[k] = xyz[i];
     if (xyz[i] > high[k]) high[k] = xyz[i];
   }
-  return {low, high};
+  const center = xyz.length ? low.map((value, k) => value / 2 + high[k] / 2) : [0, 0, 0];
+  return {low, high, center};
 }
 
 // Splits facets into triangle fans, and collects the distinct edges.
@@ -93,19 +95,14 @@ export class Shape {
     this.xyz = xyz;
     this.triangles = triangles;
     this.edges = edges;
-    const {low, high} = boxOf(xyz);
     this.isEmpty = xyz.length === 0;
-    this.low = low;
-    this.high = high;
-    this.center = this.isEmpty ? [0, 0, 0] : low.map((value, k) => value / 2 + high[k] / 2);
-    let reach = 0;
+    Object.assign(this, boxOf(xyz));
+    const [cx, cy, cz] = this.center;
+    this.radius = 0;
     for (let i = 0; i < xyz.length; i += 3) {
-      reach = Math.max(
-          reach,
-          Math.hypot(
-              xyz[i] - this.center[0], xyz[i + 1] - this.center[1], xyz[i + 2] - this.center[2]));
+      this.radius =
+          Math.max(this.radius, Math.hypot(xyz[i] - cx, xyz[i + 1] - cy, xyz[i + 2] - cz));
     }
-    this.radius = reach;
   }
 
   get vertexCount() {

@@ -1,10 +1,8 @@
 // A recorded watch: the colliding pairs, or the existing hulls, at each moment.
-import {runsOf} from 'hulld/panels/time_line.js';
+import {playTime, runsOf} from 'hulld/panels/time_line.js';
 
-// Time that a moment takes while playing, within limits for the whole.
+// Time that a moment takes while playing.
 const MOMENT_MS = 400;
-const MIN_MS = 3000;
-const MAX_MS = 30000;
 
 const COLLIDING = ['RELATION_TOUCHING', 'RELATION_OVERLAPPING'];
 
@@ -69,7 +67,7 @@ export class Watch {
     return {
       last,
       steps: 1,
-      length: Math.min(Math.max(MOMENT_MS * last, MIN_MS), MAX_MS),
+      length: playTime(last, MOMENT_MS),
       marks: () => runsOf(this.contacts),
       text: (moment) => `revision ${this.moments[moment].revision}`,
       show: (moment) => this.show(moment),

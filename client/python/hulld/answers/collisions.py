@@ -255,8 +255,24 @@ class Problem:
     reason: str | None
 
 
+class _Answer:
+    """The answer about a pair."""
+
+    relation: Relation
+
+    @property
+    def colliding(self) -> bool:
+        """TOUCHING or OVERLAPPING."""
+        return self.relation in (Relation.TOUCHING, Relation.OVERLAPPING)
+
+    def __bool__(self) -> bool:
+        raise TypeError(
+            "an answer is neither true nor false; use .colliding, .relation, or .within_clearance"
+        )
+
+
 @dataclass(frozen=True)
-class Collision:
+class Collision(_Answer):
     """The answer about a pair.
 
     relation: exact, unless WITHIN_TOLERANCE. axis, analysis, certificate, separation, witness,
@@ -288,16 +304,6 @@ class Collision:
     first_contact: FirstContact | None = None
     _query: Placements | None = field(default=None, repr=False, compare=False)
     _viewer: Viewer | None = field(default=None, repr=False, compare=False)
-
-    @property
-    def colliding(self) -> bool:
-        """TOUCHING or OVERLAPPING."""
-        return self.relation in (Relation.TOUCHING, Relation.OVERLAPPING)
-
-    def __bool__(self) -> bool:
-        raise TypeError(
-            "an answer is neither true nor false; use .colliding, .relation, or .within_clearance"
-        )
 
     def __repr__(self) -> str:
         return _short(self, f"{self.hull_a!r}, {self.hull_b!r}", ("hull_a", "hull_b", "header"))
@@ -359,7 +365,7 @@ def _versioned(hull: HullVersion) -> str:
 
 
 @dataclass(frozen=True)
-class AnswerRow:
+class AnswerRow(_Answer):
     """The answer about one of many pairs.
 
     pair: the indices of its placements; None in rows of Answers. problem: the reason for a missing
@@ -381,16 +387,6 @@ class AnswerRow:
     problem: Problem | None
     normal: Normal | None = None
     first_contact: FirstContact | None = None
-
-    @property
-    def colliding(self) -> bool:
-        """TOUCHING or OVERLAPPING."""
-        return self.relation in (Relation.TOUCHING, Relation.OVERLAPPING)
-
-    def __bool__(self) -> bool:
-        raise TypeError(
-            "an answer is neither true nor false; use .colliding, .relation, or .within_clearance"
-        )
 
     def __repr__(self) -> str:
         return _short(self, "" if self.pair is None else f"pair={self.pair}", ("pair",))

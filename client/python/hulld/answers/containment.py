@@ -12,7 +12,7 @@ from hulld.answers.collisions import Answers, Batch, Relation
 from hulld.answers.status import Limits
 from hulld.geometry.placements import Placement, Placements
 from hulld.geometry.points import Points
-from hulld.geometry.poses import pack_pose
+from hulld.geometry.poses import pack_pose, pack_poses
 
 #: Maximum number of points per call: about 4 MiB.
 _POINTS_PER_CALL = 1 << 16
@@ -75,10 +75,7 @@ class PointQuery:
         """The placements, the hull first, and the pairs of the hull with each point."""
         indices = np.ones(len(points) + 1, np.uint32)
         indices[0] = 0
-        poses = np.zeros((len(points) + 1, 7))
-        poses[0] = self._pose
-        poses[1:, 0] = 1
-        poses[1:, 4:] = points
+        poses = np.vstack([self._pose, pack_poses(points)])
         placements = Placements(self._ids, poses, indices, shapes=self._shapes)
         pairs = np.zeros((len(points), 2), np.uint32)
         pairs[:, 1] = np.arange(1, len(points) + 1)

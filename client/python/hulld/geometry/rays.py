@@ -7,6 +7,7 @@ import numpy.typing as npt
 
 from hulld.geometry.placements import Placements
 from hulld.geometry.points import as_points
+from hulld.geometry.poses import pack_poses
 
 Vectors = npt.NDArray[np.float64]
 
@@ -27,21 +28,14 @@ def ray_ends(origins: npt.ArrayLike, directions: npt.ArrayLike) -> tuple[Vectors
 
 def with_rays(targets: Placements, starts: Vectors, ends: Vectors) -> Placements:
     """The rays, and then the targets."""
-
-    def poses(translations: Vectors) -> npt.NDArray[np.float64]:
-        rows = np.zeros((len(translations), 7))
-        rows[:, 0] = 1
-        rows[:, 4:] = translations
-        return rows
-
     shape = len(targets.ids) + len(targets.shapes)
     radii = np.zeros(len(targets)) if targets.radii is None else targets.radii
     at_end = targets.poses if targets.end_poses is None else targets.end_poses
     return Placements(
         targets.ids,
-        np.vstack([poses(starts), targets.poses]),
+        np.vstack([pack_poses(starts), targets.poses]),
         np.concatenate([np.full(len(starts), shape, np.uint32), targets.indices]),
         shapes=[*targets.shapes, np.zeros((1, 3))],
         radii=np.concatenate([np.zeros(len(starts)), radii]),
-        end_poses=np.vstack([poses(ends), at_end]),
+        end_poses=np.vstack([pack_poses(ends), at_end]),
     )

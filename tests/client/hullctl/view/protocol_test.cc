@@ -41,10 +41,10 @@ std::string ErrorOf(const std::string& json) {
 }
 
 TEST(Protocol, QueriesKeepEveryBitOfAPose) {
-  const Pose7 pose = {0.1, -1e-308, 1e308, 5e-324, 1.0 / 3, -0.1, 12345678.900000001};
-  const auto message = ParsePageMessage(
-      R"({"type":"query","scene":2,"update":7,"objects":[3],"poses":)" +
-      NumbersJson(pose.data(), pose.size()) + R"(,"pair":[3,1],"tolerance":0.25,"rest":true})");
+  const RigidPose pose = {0.1, -1e-308, 1e308, 5e-324, 1.0 / 3, -0.1, 12345678.900000001};
+  const auto message =
+      ParsePageMessage(R"({"type":"query","scene":2,"update":7,"objects":[3],"poses":)" +
+                       NumbersJson(pose) + R"(,"pair":[3,1],"tolerance":0.25,"rest":true})");
   ASSERT_TRUE(message.ok()) << message.status();
   ASSERT_TRUE(message->query.has_value());
   const ViewQuery& query = *message->query;
@@ -173,7 +173,7 @@ TEST(Protocol, NamesOfFilesAreUtf8) {
 
 TEST(Protocol, NumbersThatJsonLacksBecomeNull) {
   const double numbers[] = {std::numeric_limits<double>::infinity(), std::nan(""), 2};
-  EXPECT_EQ(NumbersJson(numbers, 3), "[null,null,2]");
+  EXPECT_EQ(NumbersJson(numbers), "[null,null,2]");
 }
 
 }  // namespace protocol_test

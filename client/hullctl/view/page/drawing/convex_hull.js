@@ -1,15 +1,11 @@
 // The convex hull of a few hundred points in floating point, for pictures only: answers use the
 // hulls computed by hulld.
+import {cross, difference, dot} from 'hulld/vector.js';
 
 // Points closer to a facet than this fraction of the extent do not count as outside.
 const RELATIVE_TOLERANCE = 1e-9;
 
 const GOLDEN_ANGLE = Math.PI * (3 - Math.sqrt(5));
-
-const minus = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-const cross =
-    (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 
 // Returns the index of the maximum measure.
 function farthest(points, measure) {
@@ -56,18 +52,18 @@ export function fewVertices({xyz}, most) {
 // Cost: O(points * facets). Source: the beneath-beyond method, Gruenbaum 1961.
 export function hullTriangles(points) {
   const a = points[0];
-  const b = points[farthest(points, (p) => dot(minus(p, a), minus(p, a)))];
-  const along = minus(b, a);
+  const b = points[farthest(points, (p) => Math.hypot(...difference(p, a)))];
+  const along = difference(b, a);
   const tolerance = RELATIVE_TOLERANCE * Math.hypot(...along);
-  const c = points[farthest(points, (p) => Math.hypot(...cross(minus(p, a), along)))];
-  const normal = cross(along, minus(c, a));
-  const height = (p) => dot(minus(p, a), normal) / (Math.hypot(...normal) || 1);
+  const c = points[farthest(points, (p) => Math.hypot(...cross(difference(p, a), along)))];
+  const normal = cross(along, difference(c, a));
+  const height = (p) => dot(difference(p, a), normal) / (Math.hypot(...normal) || 1);
   const d = points[farthest(points, (p) => Math.abs(height(p)))];
   if (Math.abs(height(d)) <= tolerance) return [];
 
   const facetOf = (corners) => {
     const [p, q, r] = corners.map((i) => points[i]);
-    const n = cross(minus(q, p), minus(r, p));
+    const n = cross(difference(q, p), difference(r, p));
     const length = Math.hypot(...n) || 1;
     const unit = n.map((value) => value / length);
     return {corners, unit, offset: dot(unit, p) + tolerance};

@@ -82,7 +82,7 @@ export class Crowd extends DrawnGroup {
     if (Number.isNaN(first)) return;
     const {xyz} = this.model.hullOf(object);
     const quaternion = unitQuaternion(object.pose);
-    const shift = object.pose.slice(4).map((value, k) => value - this.model.origin[k]);
+    const shift = this.stage.local(object.pose.slice(4)).toArray();
     const {array} = this.positions;
     for (let i = 0; i < xyz.length; i += 3) {
       const p = rotate(quaternion, [xyz[i], xyz[i + 1], xyz[i + 2]]);

@@ -59,37 +59,32 @@ export class Gizmo {
     this.stage.draw();
   }
 
-  get object() {
-    return this.model.selected === null ? null : this.model.objects[this.model.selected];
-  }
-
   // Moves the handles to the object, or hides them.
   update() {
-    const {object, model} = this;
+    const {model} = this;
+    const {object} = model;
     if (!this.handles.enabled || !object || !object.hullId || object.isDriven ||
         !model.isShown(object) || !model.shapeOf(object)) {
       this.handles.detach();
       return;
     }
     if (!this.handles.dragging) {
-      const center = model.centerOf(object);
-      const [w, x, y, z] = unitQuaternion(object.pose);
-      this.proxy.position.set(...center.map((value, k) => value - model.origin[k]));
-      this.proxy.quaternion.set(x, y, z, w);
+      this.stage.place(this.proxy, model.centerOf(object), object.pose);
       this.proxy.updateMatrixWorld();
     }
     this.handles.attach(this.proxy);
   }
 
   begin() {
-    this.startPose = this.object.pose;
+    this.startPose = this.model.object.pose;
     this.startPosition = this.proxy.position.clone();
   }
 
   // Applies the handles to the pose. A move adds to the translation and keeps the quaternion bit
   // for bit; a turn keeps the center of the box in place.
   follow(rest) {
-    const {object, model} = this;
+    const {model} = this;
+    const {object} = model;
     if (!object || !this.startPose) return;
     let pose = this.startPose.slice();
     if (this.mode === 'translate') {
@@ -108,7 +103,8 @@ export class Gizmo {
   // Moves the selected object along a world axis by `steps` of about a hundredth of its size: a
   // power of ten, so that numbers stay short.
   nudge(axis, steps) {
-    const {object, model} = this;
+    const {model} = this;
+    const {object} = model;
     if (!object || !object.hullId || object.isDriven) return;
     const step = 10 ** Math.floor(Math.log10((model.radiusOf(object) || 1) / 20));
     const pose = object.pose.slice();

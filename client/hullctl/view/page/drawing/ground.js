@@ -40,7 +40,7 @@ export class Ground extends DrawnGroup {
     const add = (at) => {
       const distance = Math.hypot(at[u] - center[u], at[v] - center[v]) / reach;
       const color = strong.clone().lerp(faint, Math.min(1, distance ** 2));
-      positions.push(...at.map((value, k) => value - this.model.origin[k]));
+      positions.push(...this.stage.local(at).toArray());
       colors.push(color.r, color.g, color.b);
     };
     for (const [along, across] of [[u, v], [v, u]]) {

@@ -1,7 +1,7 @@
 // Labels with the names of objects, as HTML over the canvas. Labels never overlap. The queried pair
 // has priority; then objects closer to the camera.
-import {THREE} from 'hulld/drawing/three.js';
 import {RELATIONS} from 'hulld/palette.js';
+import {element, tag} from 'hulld/panels/dom.js';
 
 const GAP = 2;
 
@@ -26,22 +26,15 @@ export class Labels {
                                         model.objects;
     for (const object of wanted) {
       if (!model.isShown(object) || !model.shapeOf(object)) continue;
-      const element = document.createElement('div');
       const relation = RELATIONS[model.relationOf.get(object.index)];
-      element.className = 'label';
-      element.textContent = object.name;
-      if (relation) {
-        const tag = document.createElement('span');
-        tag.className = `tag ${relation.style}`;
-        tag.textContent = ` ${relation.sign} ${relation.word}`;
-        element.append(tag);
-      }
-      this.root.append(element);
-      this.rows.set(object, {element});
+      const label = element(
+          'div', {className: 'label'}, object.name, ...(relation ? [' ', tag(relation)] : []));
+      this.root.append(label);
+      this.rows.set(object, {label});
     }
     for (const row of this.rows.values()) {
-      row.width = row.element.offsetWidth;
-      row.height = row.element.offsetHeight;
+      row.width = row.label.offsetWidth;
+      row.height = row.label.offsetHeight;
     }
     this.stage.draw();
   }
@@ -67,9 +60,9 @@ export class Labels {
       row.box = this.freeBox(row, taken);
       if (row.box) taken.push(row.box);
     }
-    for (const {element, box} of this.rows.values()) {
-      element.hidden = !box;
-      if (box) element.style.transform = `translate(${box.left}px, ${box.top}px)`;
+    for (const {label, box} of this.rows.values()) {
+      label.hidden = !box;
+      if (box) label.style.transform = `translate(${box.left}px, ${box.top}px)`;
     }
   }
 
@@ -98,17 +91,14 @@ export class Labels {
   // from the camera; null if its middle is outside the picture.
   anchorOf(object) {
     const {model, stage} = this;
-    const corners = model.cornersOf(object).map(
-        (corner) => stage.toScreen(
-            new THREE.Vector3(...corner.map((value, k) => value - model.origin[k]))));
+    const corners = model.cornersOf(object).map((corner) => stage.toScreen(stage.local(corner)));
     if (!corners.every(Boolean)) return null;
     const [xs, ys] = [0, 1].map((k) => corners.map((corner) => corner[k]));
     const [top, bottom] = [Math.min(...ys), Math.max(...ys)];
     const x = (Math.min(...xs) + Math.max(...xs)) / 2;
     const {clientWidth, clientHeight} = stage.canvas;
     if (x < 0 || x > clientWidth || bottom < 0 || top > clientHeight) return null;
-    const center =
-        new THREE.Vector3(...model.centerOf(object).map((value, k) => value - model.origin[k]));
+    const center = stage.local(model.centerOf(object));
     return {x, top, bottom, distance: center.distanceTo(stage.camera.position)};
   }
 }

@@ -58,10 +58,6 @@ export class Marks extends DrawnGroup {
     this.stage.draw();
   }
 
-  local(p) {
-    return new THREE.Vector3(...p.map((value, k) => value - this.model.origin[k]));
-  }
-
   line(points, color, options = {}) {
     const geometry = new THREE.BufferGeometry().setFromPoints(points);
     const material = new THREE.LineBasicMaterial(
@@ -94,14 +90,14 @@ export class Marks extends DrawnGroup {
       if (!hull || hull.edges.length > 2 * MAX_PIECE_EDGES) return;
       const vertices = Array.from(
           {length: hull.vertexCount},
-          (_, i) => this.local(
+          (_, i) => this.stage.local(
               this.model.placed(objects[k], piece, hull.xyz.subarray(3 * i, 3 * i + 3))));
       this.line(Array.from(hull.edges, (i) => vertices[i]), this.stage.theme.edge);
     });
   }
 
   addWitness(points) {
-    const [a, b] = points.map((p) => this.local(p));
+    const [a, b] = points.map((p) => this.stage.local(p));
     this.line([a, b], MARK_COLORS.witness);
     this.dots([a, b], MARK_COLORS.witness, 9);
   }
@@ -113,9 +109,9 @@ export class Marks extends DrawnGroup {
     const {axis} = this.model.answer;
     const pieces = this.model.decidingPieces();
     const ends = [axis.featureA, axis.featureB].map(
-        ({xyz}, k) =>
-            this.local(this.model.placed(objects[k], pieces[k], xyz.slice(0, 3).map(Number))));
-    const near = witness ? witness.map((p) => this.local(p)) : ends;
+        ({xyz}, k) => this.stage.local(
+            this.model.placed(objects[k], pieces[k], xyz.slice(0, 3).map(Number))));
+    const near = witness ? witness.map((p) => this.stage.local(p)) : ends;
     const middle = near[0].clone().add(near[1]).multiplyScalar(0.5);
     const height = (n.dot(ends[0]) + n.dot(ends[1])) / 2;
     middle.addScaledVector(n, height - n.dot(middle));
@@ -164,7 +160,7 @@ export class Marks extends DrawnGroup {
   // Returns [low, high]: the box of the objects, slightly enlarged.
   boxOf(objects) {
     const {corners, radius} = this.model.bounds(objects, true);
-    const box = new THREE.Box3().setFromPoints(corners.map((corner) => this.local(corner)));
+    const box = new THREE.Box3().setFromPoints(corners.map((corner) => this.stage.local(corner)));
     box.expandByScalar(0.05 * radius);
     return [box.min, box.max];
   }
@@ -174,7 +170,7 @@ export class Marks extends DrawnGroup {
     const pieces = this.model.decidingPieces();
     for (const pair of certificate.pairs) {
       [pair.vertexA, pair.vertexB].forEach((vertex, k) => {
-        points.push(this.local(this.model.placed(objects[k], pieces[k], number(vertex))));
+        points.push(this.stage.local(this.model.placed(objects[k], pieces[k], number(vertex))));
       });
     }
     if (!points.length) return;

@@ -4,7 +4,6 @@ import {DrawnGroup, facetMaterial} from 'hulld/drawing/drawn_group.js';
 import {FINE_LAYER} from 'hulld/drawing/stage.js';
 import {discTexture, THREE} from 'hulld/drawing/three.js';
 import {MARK_COLORS, RELATIONS} from 'hulld/palette.js';
-import {unitQuaternion} from 'hulld/pose.js';
 
 const FLASH_MS = 1200;
 
@@ -157,12 +156,8 @@ export class ObjectView extends DrawnGroup {
     this.shift(edges, hull);
   }
 
-  // Subtracts in double, then converts to float: no jitter.
   place() {
-    const center = this.model.centerOf(this.object);
-    const [w, x, y, z] = unitQuaternion(this.object.pose);
-    this.group.position.set(...center.map((value, k) => value - this.model.origin[k]));
-    this.group.quaternion.set(x, y, z, w);
+    this.stage.place(this.group, this.model.centerOf(this.object), this.object.pose);
   }
 
   // Highlights new vertices.

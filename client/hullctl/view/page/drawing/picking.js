@@ -1,6 +1,6 @@
 // Finds the object under the pointer: the first one on a ray, in double.
 import {THREE} from 'hulld/drawing/three.js';
-import {rotateBack, toWorld, unitQuaternion} from 'hulld/pose.js';
+import {toWorld} from 'hulld/pose.js';
 
 // Distance in CSS pixels within which a picked point snaps to a vertex.
 const SNAP = 10;
@@ -25,8 +25,7 @@ function nearestVertex(model, stage, object, x, y, reach) {
   let least = SNAP;
   for (let i = 0; i < xyz.length; i += 3) {
     const point = Array.from(xyz.subarray(i, i + 3));
-    const local = new THREE.Vector3(
-        ...toWorld(object.pose, point).map((value, k) => value - model.origin[k]));
+    const local = stage.local(toWorld(object.pose, point));
     const seen = stage.toScreen(local);
     if (!seen) continue;
     const away = Math.hypot(seen[0] - x, seen[1] - y);
@@ -40,37 +39,36 @@ function nearestVertex(model, stage, object, x, y, reach) {
 // Returns {index, point}: the object under (x, y), in CSS pixels of the canvas, and the point that
 // was hit, in the frame of the object; null if none. `toVertex`: snap to a vertex nearby.
 export function pick(model, stage, x, y, {toVertex = false} = {}) {
-  const ray = new THREE.Raycaster();
-  ray.setFromCamera(
+  const caster = new THREE.Raycaster();
+  caster.setFromCamera(
       {
         x: 2 * x / stage.canvas.clientWidth - 1,
         y: 1 - 2 * y / stage.canvas.clientHeight,
       },
       stage.camera);
-  const origin = ray.ray.origin.toArray();
-  const direction = ray.ray.direction.toArray();
+  const {ray} = caster;
+  const frame = new THREE.Object3D();
   let nearest = Infinity;
   let picked = null;
   for (const object of model.objects) {
     const shape = model.roundedOf(object) ?? model.shapeOf(object);
     if (!model.isShown(object) || !shape || shape.isEmpty) continue;
-    const center = model.centerOf(object).map((value, k) => value - model.origin[k]);
-    const toward = origin.map((value, k) => value - center[k]);
-    const along = -(toward[0] * direction[0] + toward[1] * direction[1] + toward[2] * direction[2]);
-    const closest = toward.map((value, k) => value + along * direction[k]);
-    if (Math.hypot(...closest) > shape.radius || along + shape.radius < 0) continue;
-    if (along - shape.radius > nearest) continue;
-    const q = unitQuaternion(object.pose);
-    const local = rotateBack(q, toward).map((value, k) => value + shape.center[k]);
-    const turned = rotateBack(q, direction);
-    const turnedRay = new THREE.Ray(new THREE.Vector3(...local), new THREE.Vector3(...turned));
-    const distance = shape.triangles.length ? hitTriangles(shape, turnedRay) : along;
+    stage.place(frame, model.centerOf(object), object.pose);
+    const along = frame.position.clone().sub(ray.origin).dot(ray.direction);
+    const sphere = new THREE.Sphere(frame.position, shape.radius);
+    if (!ray.intersectsSphere(sphere) || along - shape.radius > nearest) continue;
+    const back = frame.quaternion.clone().conjugate();
+    const center = new THREE.Vector3(...shape.center);
+    const local = new THREE.Ray(
+        ray.origin.clone().sub(frame.position).applyQuaternion(back).add(center),
+        ray.direction.clone().applyQuaternion(back));
+    const distance = shape.triangles.length ? hitTriangles(shape, local) : along;
     if (distance >= nearest) continue;
     nearest = distance;
-    picked = {index: object.index, point: local.map((value, k) => value + distance * turned[k])};
+    picked = {index: object.index, point: local.at(distance, new THREE.Vector3()).toArray()};
   }
   if (picked && toVertex) {
-    const reach = stage.camera.position.distanceTo(ray.ray.origin) + nearest;
+    const reach = stage.camera.position.distanceTo(ray.origin) + nearest;
     const object = model.objects[picked.index];
     picked.point = nearestVertex(model, stage, object, x, y, 1.02 * reach) ?? picked.point;
   }

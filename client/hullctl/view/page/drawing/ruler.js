@@ -4,6 +4,7 @@ import {pick} from 'hulld/drawing/picking.js';
 import {discTexture, THREE} from 'hulld/drawing/three.js';
 import {short} from 'hulld/panels/dom.js';
 import {toWorld} from 'hulld/pose.js';
+import {difference} from 'hulld/vector.js';
 
 export class Ruler extends DrawnGroup {
   constructor(model, stage) {
@@ -37,7 +38,7 @@ export class Ruler extends DrawnGroup {
 
   get distance() {
     const [p, q] = this.points;
-    return q ? Math.hypot(q[0] - p[0], q[1] - p[1], q[2] - p[2]) : null;
+    return q ? Math.hypot(...difference(q, p)) : null;
   }
 
   // Called when the scene is replaced.
@@ -55,8 +56,8 @@ export class Ruler extends DrawnGroup {
                                                  'Pick two points';
     this.label.title = distance === null ? '' : String(distance);
     if (this.ends.length) {
-      const geometry = new THREE.BufferGeometry().setFromPoints(this.points.map(
-          (point) => new THREE.Vector3(...point.map((value, k) => value - this.model.origin[k]))));
+      const geometry = new THREE.BufferGeometry().setFromPoints(
+          this.points.map((point) => this.stage.local(point)));
       const common = {color: this.stage.theme.edge, depthTest: false, transparent: true};
       const line = new THREE.Line(geometry, new THREE.LineBasicMaterial(common));
       const dots = new THREE.Points(geometry, new THREE.PointsMaterial({
@@ -76,9 +77,8 @@ export class Ruler extends DrawnGroup {
   placeLabel() {
     if (!this.on) return;
     const [p, q] = this.points;
-    const middle = q &&
-        this.stage.toScreen(
-            new THREE.Vector3(...p.map((value, k) => (value + q[k]) / 2 - this.model.origin[k])));
+    const middle =
+        q && this.stage.toScreen(this.stage.local(p.map((value, k) => (value + q[k]) / 2)));
     const [x, y] = middle || [this.stage.canvas.clientWidth / 2, 110];
     this.label.style.transform =
         `translate(${Math.round(x)}px, ${Math.round(y)}px) translate(-50%, -140%)`;

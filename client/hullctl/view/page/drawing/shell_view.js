@@ -3,7 +3,6 @@
 import {DrawnGroup} from 'hulld/drawing/drawn_group.js';
 import {THREE} from 'hulld/drawing/three.js';
 import {MARK_COLORS} from 'hulld/palette.js';
-import {unitQuaternion} from 'hulld/pose.js';
 
 // Shells of larger hulls have as many facets as the hull.
 const MAX_FACETS = 20000;
@@ -45,10 +44,10 @@ export class ShellView extends DrawnGroup {
   }
 
   showTolerance() {
-    const {selected, tolerance} = this.model;
+    const {object, tolerance} = this.model;
     this.empty();
-    if (selected === null || tolerance === 0) return;
-    this.object = this.model.objects[selected];
+    if (!object || tolerance === 0) return;
+    this.object = object;
     const hull = this.model.hullOf(this.object);
     if (hull?.dimension === 3 && !hull.isBody) this.addShell(hull, tolerance);
     this.place();
@@ -85,10 +84,7 @@ export class ShellView extends DrawnGroup {
   place() {
     if (!this.object || !this.group.children.length) return;
     const base = this.model.hullOf(this.object).center;
-    const center = this.model.centerOf(this.object);
-    const [w, x, y, z] = unitQuaternion(this.object.pose);
-    this.group.position.set(...center.map((value, k) => value - this.model.origin[k]));
-    this.group.quaternion.set(x, y, z, w);
+    this.stage.place(this.group, this.model.centerOf(this.object), this.object.pose);
     for (const part of this.group.children) {
       part.position.set(...part.userData.center.map((value, k) => value - base[k]));
     }

@@ -2,6 +2,7 @@
 // relative to model.origin.
 import {THREE} from 'hulld/drawing/three.js';
 import {AXIS_COLORS, THEMES} from 'hulld/palette.js';
+import {unitQuaternion} from 'hulld/pose.js';
 
 const FLIGHT_MS = 350;
 
@@ -108,6 +109,19 @@ export class Stage {
     this.draw();
   }
 
+  // Returns a world point relative to model.origin: subtracts in double, before the GPU's floats
+  // would lose the difference.
+  local(p) {
+    return new THREE.Vector3(...p.map((value, k) => value - this.model.origin[k]));
+  }
+
+  // Moves a part to a world point, with the rotation of a pose.
+  place(part, center, pose) {
+    const [w, x, y, z] = unitQuaternion(pose);
+    part.position.copy(this.local(center));
+    part.quaternion.set(x, y, z, w);
+  }
+
   // Requests a frame. `isMotion`: it belongs to a motion of the camera or of an object.
   draw(isMotion = false) {
     this.isMotion ||= isMotion;
@@ -211,7 +225,7 @@ export class Stage {
   // Shows all of the bounds (model.js); keeps the direction of view unless one is given: a key of
   // `views`, or a vector.
   flyTo({center, radius, corners}, {jump = false, direction = null} = {}) {
-    const target = new THREE.Vector3(...center.map((value, k) => value - this.model.origin[k]));
+    const target = this.local(center);
     const view = this.views[direction] ?
         new THREE.Vector3(...this.views[direction]) :
         direction?.clone() || this.camera.position.clone().sub(this.controls.target);
@@ -250,8 +264,7 @@ export class Stage {
   keepInView(bounds) {
     if (!this.isFitted || this.flight) return;
     const isOutside = bounds.corners.some((corner) => {
-      const seen = this.toScreen(
-          new THREE.Vector3(...corner.map((value, k) => value - this.model.origin[k])));
+      const seen = this.toScreen(this.local(corner));
       return !seen || seen[0] < 0 || seen[0] > this.canvas.clientWidth || seen[1] < 0 ||
           seen[1] > this.canvas.clientHeight;
     });

@@ -8,7 +8,7 @@ import {DrawnGroup} from 'hulld/drawing/drawn_group.js';
 import {edgeWeight, geometryOf} from 'hulld/drawing/object_view.js';
 import {THREE} from 'hulld/drawing/three.js';
 import {RELATIONS} from 'hulld/palette.js';
-import {angleBetween, poseAt, toWorld, unitQuaternion} from 'hulld/pose.js';
+import {angleBetween, poseAt, toWorld} from 'hulld/pose.js';
 
 // Largest rotation between two samples, in radians, and the greatest number of halvings.
 const MAX_ANGLE = Math.PI / 16;
@@ -97,7 +97,7 @@ export class SweepView extends DrawnGroup {
   }
 
   add(part, position, order) {
-    part.position.set(...position.map((value, k) => value - this.model.origin[k]));
+    part.position.copy(this.stage.local(position));
     part.userData.sharesGeometry = true;
     part.renderOrder = order;
     this.group.add(part);
@@ -143,9 +143,9 @@ export class SweepView extends DrawnGroup {
         depthTest: false,
       });
       const outline = new THREE.LineSegments(geometryOf(hull, 'edges'), material);
-      const [w, x, y, z] = unitQuaternion(pose);
-      outline.quaternion.set(x, y, z, w);
-      this.add(outline, toWorld(pose, hull.center), 13);
+      const center = toWorld(pose, hull.center);
+      this.stage.place(outline, center, pose);
+      this.add(outline, center, 13);
     }
   }
 

@@ -1,6 +1,6 @@
 // The server's answer about the pair, and about all pairs of the scene.
 import {MARK_COLORS, RELATIONS, RUNGS} from 'hulld/palette.js';
-import {element, facts, grouped, rounded, short} from 'hulld/panels/dom.js';
+import {details, element, facts, grouped, missingAnswer, quiet, rounded, short, slider, tag} from 'hulld/panels/dom.js';
 import {ProofLine} from 'hulld/panels/proof_line.js';
 import {poseText} from 'hulld/pose.js';
 import {certificateProblem} from 'hulld/proof/certificate.js';
@@ -20,6 +20,9 @@ const AXIS_KINDS = {
   AXIS_KIND_FLAT: 'flat hulls',
   AXIS_KIND_GENERAL: 'found by search',
 };
+
+const roundedVector = ({x, y, z}) => rounded(x, y, z);
+const note = (text) => element('span', {className: 'quiet'}, text);
 
 export class AnswerPanel {
   constructor(model, marks, live) {
@@ -41,8 +44,7 @@ export class AnswerPanel {
       const hint = model.objects.filter((o) => o.hullId && !o.gone).length > 1 ?
           'Select an object in the picture or the list; the nearest other object completes the pair.' :
           'A pair needs two hulls or bodies.';
-      this.root.replaceChildren(
-          element('h2', {}, 'Answer'), element('p', {className: 'quiet'}, hint));
+      this.root.replaceChildren(element('h2', {}, 'Answer'), quiet(hint));
       return;
     }
     this.root.replaceChildren(
@@ -77,8 +79,7 @@ export class AnswerPanel {
     const {answer, pair} = this.model;
     if (!pair) return;
     if (!answer) {
-      const text = this.live ? 'Waiting for the answer\u2026' : 'Not recorded in this file.';
-      this.body.replaceChildren(element('p', {className: 'quiet'}, text));
+      this.body.replaceChildren(quiet(missingAnswer(this.live)));
       return;
     }
     if (answer.problem) {
@@ -139,28 +140,22 @@ export class AnswerPanel {
     const value = Number(separation?.value);
     const list = facts([
       ['separation', separation && rounded(separation.value)],
-      [
-        '',
-        value < 0 ? element('span', {className: 'quiet'}, 'minus the depth of the overlap') : null
-      ],
+      ['', value < 0 ? note('minus the depth of the overlap') : null],
       ['within', separation && rounded(separation.bound)],
       ['certificate', certificate && this.certificateText(certificate)],
-      ['axis', axis?.direction && rounded(axis.direction.x, axis.direction.y, axis.direction.z)],
-      ['', axis?.direction && element('span', {className: 'quiet'}, AXIS_KINDS[axis.kind] || '')],
+      ['axis', axis?.direction && roundedVector(axis.direction)],
+      ['', axis?.direction && note(AXIS_KINDS[axis.kind] || '')],
       ...this.pieceRows(answer),
       ...this.tolerantRows(answer),
     ]);
     const more = facts([
-      ['point of A', witness && rounded(witness.pointA.x, witness.pointA.y, witness.pointA.z)],
-      ['point of B', witness && rounded(witness.pointB.x, witness.pointB.y, witness.pointB.z)],
+      ['point of A', witness && roundedVector(witness.pointA)],
+      ['point of B', witness && roundedVector(witness.pointB)],
       ['decided by', RUNGS[answer.rung]],
       ['revisions', `${answer.hullA.revision} and ${answer.hullB.revision}`],
     ]);
     return element(
-        'div', {id: 'answer-facts'}, list,
-        element(
-            'details', {className: 'command', open: Boolean(open)},
-            element('summary', {}, 'Witness points, revisions'), more));
+        'div', {id: 'answer-facts'}, list, details('Witness points, revisions', open, more));
   }
 
   // Rows for the deciding pieces of bodies.
@@ -213,10 +208,8 @@ export class AnswerPanel {
         `hullctl check ${a.hullId} ${b.hullId} --separation --witness --axis --certificate ` +
         `--pose-a ${poseText(poses.slice(0, 7))} --pose-b ${poseText(poses.slice(7))}` +
         [a, b].map(({radius}, k) => radius ? ` --radius-${'ab'[k]} ${radius}` : '').join('');
-    return element(
-        'details', {className: 'command', open: Boolean(open)},
-        element('summary', {}, 'Run the same query in a shell'),
-        element('pre', {tabIndex: 0, id: 'command'}, text));
+    return details(
+        'Run the same query in a shell', open, element('pre', {tabIndex: 0, id: 'command'}, text));
   }
 
   updateCollisions() {
@@ -228,28 +221,19 @@ export class AnswerPanel {
         count === 1           ? '1 pair collides' :
                                 `${grouped(count)} pairs collide`;
     const rows = pairs.slice(0, MAX_ROWS).map(([a, b, relation]) => {
-      const {word, sign, style} = RELATIONS[relation];
+      const names = `${model.objects[a].name} and ${model.objects[b].name}`;
       return element(
           'li', {},
           element(
-              'button', {
-                type: 'button',
-                onclick: () => this.visit(a, b),
-              },
-              element(
-                  'span', {className: 'names'},
-                  `${model.objects[a].name} and ${model.objects[b].name}`),
-              element('span', {className: `tag ${style}`}, `${sign} ${word}`)));
+              'button', {type: 'button', onclick: () => this.visit(a, b)},
+              element('span', {className: 'names'}, names), tag(RELATIONS[relation])));
     });
-    const more = count > rows.length ?
-        element('p', {className: 'more'}, `and ${grouped(count - rows.length)} more`) :
-        null;
-    const slider =
-        this.slider || (this.slider = this.live ? this.toleranceSlider() : element('span'));
+    if (count > rows.length)
+      rows.push(element('li', {className: 'more'}, `and ${grouped(count - rows.length)} more`));
+    this.slider ??= this.live ? this.toleranceSlider() : '';
     this.list.replaceChildren(
         element('h2', {id: 'collision-count'}, title), element('ol', {}, ...rows),
-        ...(more ? [more] : []),
-        ...problems.map((problem) => element('p', {className: 'quiet'}, problem)), slider);
+        ...problems.map(quiet), this.slider);
   }
 
   visit(a, b) {
@@ -261,22 +245,16 @@ export class AnswerPanel {
   toleranceSlider() {
     const {model} = this;
     const output = element('output', {}, 'exact');
-    const input = element('input', {
-      type: 'range',
-      min: 0,
-      max: 60,
-      value: 0,
-      id: 'tolerance',
-      'aria-label': 'Tolerance',
-      oninput: () => {
-        const radius = model.bounds()?.radius || 1;
-        const steps = Number(input.value);
-        model.tolerance =
-            steps === 0 ? 0 : Number((radius * 10 ** ((steps - 60) / 10 - 1)).toPrecision(3));
-        output.textContent = steps === 0 ? 'exact' : short(model.tolerance);
-        model.tell('tolerance');
-      },
-    });
-    return element('div', {className: 'slider'}, element('label', {}, 'Tolerance ', output, input));
+    const oninput = ({target}) => {
+      const radius = model.bounds()?.radius || 1;
+      const steps = Number(target.value);
+      model.tolerance =
+          steps === 0 ? 0 : Number((radius * 10 ** ((steps - 60) / 10 - 1)).toPrecision(3));
+      output.textContent = steps === 0 ? 'exact' : short(model.tolerance);
+      model.tell('tolerance');
+    };
+    return slider(
+        'Tolerance ',
+        {min: 0, max: 60, value: 0, id: 'tolerance', 'aria-label': 'Tolerance', oninput}, output);
   }
 }

@@ -13,6 +13,28 @@ export function element(name, properties = {}, ...children) {
   return made;
 }
 
+// A remark below the facts, or in their place.
+export const quiet = (text) => element('p', {className: 'quiet'}, text);
+
+// The text in place of an answer that has not arrived.
+export const missingAnswer = (live) =>
+    live ? 'Waiting for the answer\u2026' : 'Not recorded in this file.';
+
+// A relation (palette.js) as a sign and a word.
+export const tag = ({word, sign, style}) =>
+    element('span', {className: `tag ${style}`, title: word}, `${sign} ${word}`);
+
+// Creates a block that the user opens and closes.
+export const details = (summary, open, content) => element(
+    'details', {className: 'command', open: Boolean(open)}, element('summary', {}, summary),
+    content);
+
+// Creates a slider with a label and the parts that follow the label's text.
+export function slider(text, properties, ...parts) {
+  const input = element('input', {type: 'range', ...properties});
+  return element('div', {className: 'slider'}, element('label', {}, text, ...parts, input));
+}
+
 // Formats "1234567" as "1 234 567", with thin spaces.
 export const grouped = (count) => String(count).replace(/\B(?=(\d{3})+$)/g, '\u2009');
 

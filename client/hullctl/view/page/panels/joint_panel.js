@@ -1,5 +1,5 @@
 // Sliders for the joints of a robot.
-import {element, short} from 'hulld/panels/dom.js';
+import {element, quiet, short, slider} from 'hulld/panels/dom.js';
 
 // Poses of other joint values need hullctl.
 const RECORDED = 'Recorded. To move the joints, run hullctl view without --html.';
@@ -17,7 +17,7 @@ export class JointPanel {
   rebuild() {
     this.sliders = this.model.joints.map((joint) => this.slider(joint));
     const parts = [element('h2', {}, 'Joints'), ...this.sliders.map(({block}) => block)];
-    if (!this.live) parts.push(element('p', {className: 'quiet'}, RECORDED));
+    if (!this.live) parts.push(quiet(RECORDED));
     this.root.replaceChildren(...(this.sliders.length ? parts : []));
   }
 
@@ -28,18 +28,18 @@ export class JointPanel {
       this.move(this.model.joints.map(({value}) => value), rest);
       this.update();
     };
-    const input = element('input', {
-      type: 'range',
-      min: joint.low,
-      max: joint.high,
-      step: (joint.high - joint.low) / 1000 || 1,
-      disabled: !this.live,
-      'aria-label': `Joint ${joint.name}`,
-      oninput: () => send(false),
-      onchange: () => send(true),
-    });
-    const block = element(
-        'div', {className: 'slider'}, element('label', {}, `${joint.name} `, output, input));
+    const block = slider(
+        `${joint.name} `, {
+          min: joint.low,
+          max: joint.high,
+          step: (joint.high - joint.low) / 1000 || 1,
+          disabled: !this.live,
+          'aria-label': `Joint ${joint.name}`,
+          oninput: () => send(false),
+          onchange: () => send(true),
+        },
+        output);
+    const input = block.querySelector('input');
     const update = () => {
       input.value = joint.value;
       output.textContent = short(joint.value);

@@ -1,7 +1,7 @@
 // The first contact of the pair during its motion: the server's answer, and the check of its
 // certificate.
 import {RELATIONS} from 'hulld/palette.js';
-import {element, facts, rounded} from 'hulld/panels/dom.js';
+import {details, element, facts, missingAnswer, quiet, rounded} from 'hulld/panels/dom.js';
 import {ProofLine} from 'hulld/panels/proof_line.js';
 import {poseText} from 'hulld/pose.js';
 import {bodiesMotionProblem, motionProblem} from 'hulld/proof/motion_certificate.js';
@@ -28,21 +28,16 @@ export class MotionPanel {
     this.button.hidden = model.pairMotion?.firstContact?.contactTime === undefined;
     this.root.replaceChildren();
     if (model.time === null) return;
-    this.root.append(
-        element('h2', {}, 'Motion'), ...this.answer(isOpen),
-        element('p', {className: 'quiet'}, LEGEND));
+    this.root.append(element('h2', {}, 'Motion'), ...this.answer(isOpen), quiet(LEGEND));
   }
 
   answer(isOpen) {
     const {model} = this;
     if (!model.pair) return [];
     if (!model.pair.some((index) => model.objects[index].endPose))
-      return [element('p', {className: 'quiet'}, 'This pair does not move.')];
+      return [quiet('This pair does not move.')];
     const {pairMotion} = model;
-    if (!pairMotion) {
-      const text = this.live ? 'Waiting for the answer\u2026' : 'Not recorded in this file.';
-      return [element('p', {className: 'quiet'}, text)];
-    }
+    if (!pairMotion) return [quiet(missingAnswer(this.live))];
     if (pairMotion.problem) return [element('p', {}, pairMotion.problem)];
     const {word, sign, style} = RELATIONS[pairMotion.relation];
     const {separatedUntil, contactTime} = pairMotion.firstContact;
@@ -117,11 +112,9 @@ export class MotionPanel {
           (radius ? ` --radius-${side} ${radius}` : '');
     });
     const ids = sides.map(({hullId}) => hullId).join(' ');
-    return element(
-        'details', {className: 'command', open: Boolean(isOpen)},
-        element('summary', {}, 'Run and verify in a shell'),
-        element(
-            'pre', {tabIndex: 0, id: 'motion-command'},
-            `hullctl check ${ids} --verify${options.join('')}`));
+    const text = `hullctl check ${ids} --verify${options.join('')}`;
+    return details(
+        'Run and verify in a shell', isOpen,
+        element('pre', {tabIndex: 0, id: 'motion-command'}, text));
   }
 }

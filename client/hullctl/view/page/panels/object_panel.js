@@ -1,7 +1,11 @@
 // The selected object: its pose, a simplification of its hull, and its properties.
-import {copy, element, facts, grouped, rounded, short} from 'hulld/panels/dom.js';
+import {copy, details, element, facts, grouped, quiet, rounded, short, slider} from 'hulld/panels/dom.js';
 import {poseText} from 'hulld/pose.js';
 
+const SIDES = {
+  inside: 'inside: a subset of the vertices',
+  outside: 'outside: encloses the hull',
+};
 const POSE_NAMES = ['w', 'x', 'y', 'z', 'x', 'y', 'z'];
 
 export class ObjectPanel {
@@ -14,18 +18,12 @@ export class ObjectPanel {
     this.steps = 0;
   }
 
-  get object() {
-    return this.model.selected === null ? null : this.model.objects[this.model.selected];
-  }
-
   rebuild() {
-    const {object} = this;
+    const {object} = this.model;
     if (!object) {
       this.root.replaceChildren(
           element('h2', {}, 'Object'),
-          element(
-              'p', {className: 'quiet'},
-              'Nothing is selected. Select an object in the picture or the list.'));
+          quiet('Nothing is selected. Select an object in the picture or the list.'));
       return;
     }
     // A change of the object must not disturb typing.
@@ -53,8 +51,7 @@ export class ObjectPanel {
     const info = this.model.info.get(object.hullId) || hull?.info || body?.info;
     const isSolid = !body && hull?.dimension === 3;
     const rows = [element('h2', {}, 'Facts')];
-    if (object.gone) rows.push(element('p', {className: 'quiet'}, 'Deleted.'));
-    if (hull?.message) rows.push(element('p', {className: 'quiet'}, hull.message));
+    if (object.gone) rows.push(quiet('Deleted.'));
     rows.push(facts([
       [body ? 'body' : 'hull', object.hullId || null],
       ['revision', info?.revision],
@@ -128,10 +125,7 @@ export class ObjectPanel {
         },
         label);
     return element(
-        'div', {},
-        element(
-            'details', {className: 'command'}, element('summary', {}, 'Rotation (quaternion)'),
-            fields(0, 4)),
+        'div', {}, details('Rotation (quaternion)', false, fields(0, 4)),
         element(
             'div', {className: 'buttons'},
             copyButton(
@@ -182,7 +176,7 @@ export class ObjectPanel {
 
   // Called when the pose changes by other means.
   updatePose() {
-    const {object, inputs} = this;
+    const {inputs, model: {object}} = this;
     if (!object || !inputs || this.shownIndex !== object.index) return;
     inputs.forEach((input, i) => {
       if (document.activeElement !== input) this.showNumber(input, object.pose[i]);
@@ -190,18 +184,12 @@ export class ObjectPanel {
   }
 
   opacitySlider(object) {
-    return element('div', {className: 'slider'}, element('label', {}, 'Opacity ', element('input', {
-                                                           type: 'range',
-                                                           min: 0.1,
-                                                           max: 1,
-                                                           step: 0.05,
-                                                           value: object.opacity,
-                                                           id: 'opacity',
-                                                           oninput: ({target}) => {
-                                                             object.opacity = Number(target.value);
-                                                             this.model.tell('color');
-                                                           },
-                                                         })));
+    const oninput = ({target}) => {
+      object.opacity = Number(target.value);
+      this.model.tell('color');
+    };
+    return slider(
+        'Opacity ', {min: 0.1, max: 1, step: 0.05, value: object.opacity, id: 'opacity', oninput});
   }
 
   // A logarithmic range from 0 to half of the size.
@@ -219,36 +207,21 @@ export class ObjectPanel {
       if (this.steps === 0) this.result.replaceChildren();
       this.simplify(object, this.side, maxError);
     };
+    const oninput = ({target}) => {
+      this.steps = Number(target.value);
+      ask();
+    };
+    const onchange = ({target}) => {
+      this.side = target.value;
+      ask();
+    };
+    const options = Object.entries(SIDES).map(
+        ([value, text]) => element('option', {value, selected: this.side === value}, text));
+    const block =
+        slider('Simplify ', {min: 0, max: 40, value: 0, id: 'simplify', oninput}, this.output);
+    block.append(element('select', {'aria-label': 'Side', onchange}, ...options));
     return element(
-        'div', {className: 'block'}, element('h2', {}, 'A simpler hull'),
-        element(
-            'div', {className: 'slider'},
-            element('label', {}, 'Simplify ', this.output, element('input', {
-                      type: 'range',
-                      min: 0,
-                      max: 40,
-                      value: 0,
-                      id: 'simplify',
-                      oninput: ({target}) => {
-                        this.steps = Number(target.value);
-                        ask();
-                      },
-                    })),
-            element(
-                'select', {
-                  'aria-label': 'Side',
-                  onchange: ({target}) => {
-                    this.side = target.value;
-                    ask();
-                  },
-                },
-                element(
-                    'option', {value: 'inside', selected: this.side === 'inside'},
-                    'inside: a subset of the vertices'),
-                element(
-                    'option', {value: 'outside', selected: this.side === 'outside'},
-                    'outside: encloses the hull'))),
-        this.result);
+        'div', {className: 'block'}, element('h2', {}, 'A simpler hull'), block, this.result);
   }
 
   simplified(hull) {
@@ -260,7 +233,8 @@ export class ObjectPanel {
   // Shows the simpler hull and its answer next to the exact ones. Called when either changes.
   compare() {
     const {simpler} = this;
-    const exact = this.object && this.model.hullOf(this.object);
+    const {object} = this.model;
+    const exact = object && this.model.hullOf(object);
     if (!simpler || !exact || this.steps === 0) return;
     const of = (count, all) => `${grouped(count)} of ${grouped(all)}`;
     this.result.replaceChildren(facts([
@@ -293,6 +267,6 @@ export class ObjectPanel {
   }
 
   simplifyFailed(message) {
-    this.result?.replaceChildren(element('p', {className: 'quiet'}, message));
+    this.result?.replaceChildren(quiet(message));
   }
 }

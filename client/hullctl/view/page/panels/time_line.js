@@ -14,6 +14,9 @@ export function runsOf(moments) {
   return runs;
 }
 
+// Returns the time in ms to play a track of `count` moments of `each` ms, within limits.
+export const playTime = (count, each) => Math.min(Math.max(count * each, 3000), 30000);
+
 export class TimeLine {
   constructor() {
     [this.root, this.button, this.slider, this.text, this.marks] = [

@@ -1,7 +1,7 @@
 // The tree of objects: search, select, show and hide, color. The prefixes of IDs, up to a slash,
 // form groups.
 import {RELATIONS} from 'hulld/palette.js';
-import {element, grouped} from 'hulld/panels/dom.js';
+import {element, grouped, tag} from 'hulld/panels/dom.js';
 
 // More rows would slow down the page; the search finds the rest.
 const MAX_ROWS = 400;
@@ -35,6 +35,8 @@ function treeOf(objects, prefix = '') {
   }
   return {prefix, members, objects, groups: [...rest].map(([key, inside]) => treeOf(inside, key))};
 }
+
+const quietTag = (text) => element('span', {className: 'tag quiet'}, text);
 
 export class Tree {
   constructor(model) {
@@ -120,10 +122,8 @@ export class Tree {
             },
             `${closed ? '\u25b8' : '\u25be'} ${name} `,
             element('span', {className: 'quiet'}, grouped(members.length))),
-        this.eye(visible, group, `group-eye ${group}`, () => {
-          for (const object of members) object.visible = !visible;
-          this.model.tell('visibility');
-        }));
+        this.eye(
+            visible, group, `group-eye ${group}`, () => this.model.setVisible(members, !visible)));
   }
 
   isOpen({index, hullId}) {
@@ -161,8 +161,7 @@ export class Tree {
       return element(
           'div', {className: `row piece ${isAbsent ? 'gone' : ''}`},
           element('span', {className: 'name', title: piece.hullId}, `${i}: ${piece.hullId}`),
-          isAbsent && element('span', {className: 'tag quiet'}, 'missing'),
-          piece === decider && element('span', {className: 'tag quiet'}, 'decides'));
+          isAbsent && quietTag('missing'), piece === decider && quietTag('decides'));
     });
     const rest = pieces.length - rows.length;
     if (rest > 0) {
@@ -201,16 +200,11 @@ export class Tree {
               ondblclick: () => model.tell('fly', [object]),
             },
             object.name.slice(prefix.length)),
-        relation &&
-            element(
-                'span', {className: `tag ${relation.style}`, title: relation.word},
-                `${relation.sign} ${relation.word}`),
-        object.gone && element('span', {className: 'tag quiet'}, 'deleted'),
+        relation && tag(relation), object.gone && quietTag('deleted'),
         model.bodyOf(object) && this.opener(object),
-        this.eye(object.visible, object.name, `eye ${object.index}`, () => {
-          object.visible = !object.visible;
-          model.tell('visibility');
-        }));
+        this.eye(
+            object.visible, object.name, `eye ${object.index}`,
+            () => model.setVisible([object], !object.visible)));
     if (isOther) row.title = 'The other object of the pair';
     return row;
   }

@@ -1,7 +1,8 @@
 // Checks the certificate of an answer by exact arithmetic, from vertices and poses alone: the page
 // trusts neither the server nor hullctl. The C++ client has the same check in
 // client/verify/certificate_check.h.
-import {combination, commonExponent, cross, difference, dot, isZero, product, rotationOf, scaled, sum, toIntegers} from 'hulld/proof/exact.js';
+import {combination, commonExponent, isZero, product, rotationOf, toIntegers} from 'hulld/proof/exact.js';
+import {cross, difference, dot, scaled, sum} from 'hulld/vector.js';
 
 // Limits of the contract: Caratheodory's number for a point of the hull, and Steinitz's for an
 // interior point.

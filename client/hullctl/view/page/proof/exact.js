@@ -1,4 +1,5 @@
 // Exact numbers: integers of any length times a common power of two.
+import {dot, scaled, sum} from 'hulld/vector.js';
 
 const view = new DataView(new ArrayBuffer(8));
 const HIDDEN_BIT = 1n << 52n;
@@ -35,12 +36,6 @@ export function toInteger(number, exponent) {
 export const toIntegers = (numbers, exponent) =>
     Array.from(numbers, (number) => toInteger(number, exponent));
 
-export const scaled = (s, a) => [s * a[0], s * a[1], s * a[2]];
-export const sum = (a, b) => [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
-export const difference = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-export const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-export const cross =
-    (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 export const isZero = (a) => a.every((value) => value === 0n);
 
 // Returns {rows, scale}: R(q) and |q|^2 as symmetric bilinear forms of two quaternions. For a = b,

@@ -1,7 +1,8 @@
 // Checks the certificate of a motion by exact arithmetic, as certificate.js does for a pair at
 // rest. The C++ client has the same check in client/verify/motion_check.h.
 import {areFinite, checkExactly, checkPlacement, checkRelation, differences, gapSign, holdsOriginInside, holdsOriginOnBoundary, lengthsOf, MAX_PAIRS, placedHull, problemOf, readDirection, require} from 'hulld/proof/certificate.js';
-import {combination, commonExponent, dot, rotationForm, scaled, sum, toInteger, toIntegers} from 'hulld/proof/exact.js';
+import {combination, commonExponent, rotationForm, toInteger, toIntegers} from 'hulld/proof/exact.js';
+import {dot, scaled, sum} from 'hulld/vector.js';
 
 const negated = (n) => scaled(-1n, n);
 const plus = (a, b) => a + b;
