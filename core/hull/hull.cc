@@ -1,6 +1,8 @@
 #include "core/hull/hull.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <utility>
 
 #include "core/base/check.h"
@@ -8,16 +10,27 @@
 namespace hulld {
 namespace {
 
-Vector MeanOfAxisExtremes(const std::vector<Vector>& vertices) {
-  Vector mean = Vector::Zero();
-  for (int axis = 0; axis < 3 && !vertices.empty(); ++axis) {
-    const auto [low, high] =
-        std::minmax_element(vertices.begin(), vertices.end(),
-                            [axis](const Vector& a, const Vector& b) { return a[axis] < b[axis]; });
-    // Divides each point first, so that no sum overflows.
-    mean += *low / 6 + *high / 6;
+// The first vertex with the least coordinate and the last one with the largest, along each axis.
+struct AxisExtremes {
+  std::array<size_t, 3> low = {0, 0, 0};
+  std::array<size_t, 3> high = {0, 0, 0};
+};
+
+// Requires: at least one vertex.
+AxisExtremes ExtremesOf(std::span<const Vector> vertices) {
+  AxisExtremes extremes;
+  Vector least = vertices[0];
+  Vector largest = vertices[0];
+  for (size_t i = 0; i < vertices.size(); ++i) {
+    const Vector& v = vertices[i];
+    for (size_t k = 0; k < 3; ++k) {
+      if (v[k] < least[k]) extremes.low[k] = i;
+      if (v[k] >= largest[k]) extremes.high[k] = i;
+    }
+    least = least.cwiseMin(v);
+    largest = largest.cwiseMax(v);
   }
-  return mean;
+  return extremes;
 }
 
 }  // namespace
@@ -31,10 +44,15 @@ Hull::Hull(int dimension, std::vector<Vector> vertices, std::vector<uint32_t> fa
       edges_(std::move(edges)) {
   HULLD_CHECK(dimension_ >= -1 && dimension_ <= 3);
   HULLD_CHECK(facet_starts_.empty() || facet_starts_.back() == facet_vertices_.size());
-  for (const Vector& v : vertices_) {
-    max_abs_coordinate_ = std::max(max_abs_coordinate_, v.cwiseAbs().maxCoeff());
+  if (vertices_.empty()) return;
+  const AxisExtremes extremes = ExtremesOf(vertices_);
+  for (Eigen::Index k = 0; k < 3; ++k) {
+    const Vector& low = vertices_[extremes.low[k]];
+    const Vector& high = vertices_[extremes.high[k]];
+    max_abs_coordinate_ = std::max({max_abs_coordinate_, std::abs(low[k]), std::abs(high[k])});
+    // Divides each point first, so that no sum overflows.
+    center_ += low / 6 + high / 6;
   }
-  center_ = MeanOfAxisExtremes(vertices_);
 }
 
 }  // namespace hulld

@@ -14,7 +14,7 @@ namespace {
 // On a surface this small, testing a point against all triangles is cheap.
 constexpr size_t kMaxTrianglesToTest = 64;
 // A block of at most this many points is not sampled: all are tested against all triangles.
-constexpr size_t kSmallBlock = 4096;
+constexpr size_t kSmallBlock = 8192;
 // Each sample, and finally the block, is this many times as large as the previous sample.
 constexpr size_t kSampleRatio = 16;
 // Samples consist of runs of consecutive points, for memory locality.
@@ -88,7 +88,7 @@ class BlockInsertion {
     return ranges;
   }
 
-  // Returns a power of kSampleRatio, or 1 for all points at once.
+  // Returns a power of kSampleRatio, or 1 for all points together.
   size_t FirstStride() const {
     size_t stride = 1;
     while (points_.size() / stride > kSmallBlock) stride *= kSampleRatio;
@@ -126,10 +126,17 @@ class BlockInsertion {
   }
   void AppendSample(size_t stride, std::vector<Vector>& sample) const {
     sample.reserve(sample.size() + points_.size() / stride + kRun);
-    for (const Range& range : RangesOf(stride)) {
-      for (size_t i = range.first; i < range.end; ++i) {
-        if (!IsDone(i)) sample.push_back(points_[i]);
+    const auto append = [&](size_t first, size_t end) {
+      sample.insert(sample.end(), points_.begin() + static_cast<ptrdiff_t>(first),
+                    points_.begin() + static_cast<ptrdiff_t>(end));
+    };
+    for (auto [first, end] : RangesOf(stride)) {
+      for (const uint32_t i : done_) {
+        if (i < first || i >= end) continue;
+        append(first, i);
+        first = i + size_t{1};
       }
+      append(first, end);
     }
   }
 

@@ -25,8 +25,21 @@ struct Ranked {
   VertexId id;
 };
 
+// Sorts a span that is usually very short.
+template <typename T, typename Less>
+void SortFew(std::span<T> few, Less&& is_less) {
+  constexpr size_t kFew = 16;
+  if (few.size() > kFew) return std::sort(few.begin(), few.end(), is_less);
+  for (size_t i = 1; i < few.size(); ++i) {
+    const T moving = few[i];
+    size_t k = i;
+    for (; k > 0 && is_less(moving, few[k - 1]); --k) few[k] = few[k - 1];
+    few[k] = moving;
+  }
+}
+
 void Sort(const VertexTable& vertices, std::span<Ranked> ranked) {
-  std::sort(ranked.begin(), ranked.end(), [&vertices](const Ranked& a, const Ranked& b) {
+  SortFew(ranked, [&vertices](const Ranked& a, const Ranked& b) {
     if (a.x != b.x) return a.x < b.x;
     const Vector& p = vertices[a.id];
     const Vector& q = vertices[b.id];
@@ -153,32 +166,37 @@ class FaceCollector {
   // Returns the faces, or nothing if stopped. Requires: Run completed. Call at most once.
   std::optional<Faces> Assemble(StopPoll& poll) {
     Faces faces;
-    // Reserves exactly, because a snapshot is long-lived and never grows.
-    faces.facet_starts.reserve(triangle_facets_ + polygon_starts_.size());
-    faces.facet_vertices.reserve(3 * triangle_facets_ + polygon_vertices_.size());
-    faces.edges.reserve(departure_count_);
-    faces.facet_starts.push_back(0);
+    // Sized exactly, because a snapshot is long-lived and never grows.
+    faces.facet_starts.resize(triangle_facets_ + polygon_starts_.size());
+    faces.facet_vertices.resize(3 * triangle_facets_ + polygon_vertices_.size());
+    faces.edges.resize(departure_count_);
+    uint32_t* facet_end = faces.facet_starts.data() + 1;
+    uint32_t* const vertices = faces.facet_vertices.data();
+    uint32_t* vertex = vertices;
     const auto vertex_count = static_cast<uint32_t>(ranking_.points.size());
     uint32_t first = 0;
     for (uint32_t tail = 0; tail < vertex_count; ++tail) {
       if (poll.Step()) return std::nullopt;
       // After WriteDepartures, this is the end of the departures.
       const uint32_t end = departures_at_[tail];
-      SortByHead({departures_.get() + first, end - first});
+      SortFew(std::span(departures_.get() + first, end - first),
+              [](const Departure& a, const Departure& b) { return a.head < b.head; });
       for (; first < end; ++first) {
         const Departure& d = departures_[first];
-        faces.edges.push_back({tail, d.head});
+        faces.edges[first] = {tail, d.head};
         if (d.next <= tail) continue;
         if (d.next < vertex_count) {
-          faces.facet_vertices.insert(faces.facet_vertices.end(), {tail, d.head, d.next});
+          *vertex++ = tail;
+          *vertex++ = d.head;
+          *vertex++ = d.next;
         } else {
           const std::span<const uint32_t> polygon = Polygon(d.next - vertex_count);
-          faces.facet_vertices.insert(faces.facet_vertices.end(), polygon.begin(), polygon.end());
+          vertex = std::copy(polygon.begin(), polygon.end(), vertex);
         }
-        faces.facet_starts.push_back(static_cast<uint32_t>(faces.facet_vertices.size()));
+        *facet_end++ = static_cast<uint32_t>(vertex - vertices);
       }
     }
-    HULLD_CHECK(faces.facet_starts.size() == triangle_facets_ + polygon_starts_.size());
+    HULLD_CHECK(facet_end == faces.facet_starts.data() + faces.facet_starts.size());
     return faces;
   }
 
@@ -201,6 +219,17 @@ class FaceCollector {
   std::span<const uint32_t> Polygon(size_t k) const {
     return std::span(polygon_vertices_)
         .subspan(polygon_starts_[k], polygon_starts_[k + 1] - polygon_starts_[k]);
+  }
+
+  uint32_t RankOf(const SurfaceTriangle& t, size_t corner) const {
+    return ranking_.index_of[t.corners[corner]];
+  }
+  // Rotates the ranks so that the lowest one comes first.
+  static Ranks FromLowest(const Ranks& ranks) {
+    const auto [a, b, c] = ranks;
+    if (b < a && b < c) return {b, c, a};
+    if (c < a && c < b) return {c, a, b};
+    return ranks;
   }
 
   // Finds the flat edges and the ranks of corners, and counts the departures of each triangle as if
@@ -232,10 +261,8 @@ class FaceCollector {
       const SurfaceTriangle& t = surface_.triangle(id);
       flags_[id] |= t.flat;
       ++triangle_facets_;
-      for (size_t i = 0; i < 3; ++i) {
-        ranks_[id][i] = ranking_.index_of[t.corners[i]];
-        __builtin_prefetch(&departures_at_[ranks_[id][i]]);
-      }
+      ranks_[id] = FromLowest({RankOf(t, 0), RankOf(t, 1), RankOf(t, 2)});
+      for (const uint32_t rank : ranks_[id]) __builtin_prefetch(&departures_at_[rank]);
       const TriangleId next = t.neighbors[1];
       const SurfaceTriangle& other = surface_.triangle(next);
       if (other.corners[2] != t.corners[2]) continue;
@@ -272,7 +299,7 @@ class FaceCollector {
     size_t steps_left = 3 * surface_.triangle_count();
     do {
       if (poll.Step()) return;
-      polygon_vertices_.push_back(ranks_[id][edge]);
+      polygon_vertices_.push_back(RankOf(surface_.triangle(id), edge));
       flags_[id] |= kVisited;
       edge = (edge + 1) % 3;
       while (IsFlat(id, edge)) {
@@ -292,15 +319,14 @@ class FaceCollector {
   }
 
   // Calls visit(tail, head, next) for every edge of a triangular facet or a polygon that leads from
-  // a lower vertex to a higher one. The other edges of a triangle are visited with the number of
-  // vertices as their tail, because a branch would be unpredictable.
+  // a lower vertex to a higher one. In a triangle, that is the first edge and perhaps the second;
+  // if not, it is visited with the number of vertices as its tail, because a branch would be
+  // unpredictable.
   template <typename Visitor>
   void ForEachTriangleDeparture(const Ranks& ranks, Visitor&& visit) const {
     const auto [a, b, c] = ranks;
-    const auto none = static_cast<uint32_t>(ranking_.points.size());
-    visit(a < b ? a : none, b, c);
-    visit(b < c ? b : none, c, a);
-    visit(c < a ? c : none, a, b);
+    visit(a, b, c);
+    visit(b < c ? b : static_cast<uint32_t>(ranking_.points.size()), c, 0);
   }
   template <typename Visitor>
   void ForEachPolygonDeparture(size_t k, Visitor&& visit) const {
@@ -358,28 +384,13 @@ class FaceCollector {
     for (size_t k = 0; k + 1 < polygon_starts_.size(); ++k) ForEachPolygonDeparture(k, write);
   }
 
-  static void SortByHead(std::span<Departure> departures) {
-    constexpr size_t kFew = 16;
-    if (departures.size() > kFew) {
-      std::sort(departures.begin(), departures.end(),
-                [](const Departure& a, const Departure& b) { return a.head < b.head; });
-      return;
-    }
-    for (size_t i = 1; i < departures.size(); ++i) {
-      const Departure d = departures[i];
-      size_t k = i;
-      for (; k > 0 && departures[k - 1].head > d.head; --k) departures[k] = departures[k - 1];
-      departures[k] = d;
-    }
-  }
-
   const VertexTable& vertices_;
   const Surface& surface_;
   const Ranking& ranking_;
   // By triangle.
   std::vector<uint8_t> flags_;
-  // By triangle: the ranks of its corners. The number of vertices instead if the triangle is free,
-  // and, once its facet is known, if it is only a part of it.
+  // By triangle: the ranks of its corners, the lowest one first. The number of vertices instead if
+  // the triangle is free, and, after its facet is known, if it is only a part of it.
   std::unique_ptr<Ranks[]> ranks_;
   size_t triangle_facets_ = 0;
   // The facets that are not triangles of the surface, by ranks, each from its lowest vertex.

@@ -1,6 +1,7 @@
 #include "core/hull/growth/conflict_lists.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "core/base/check.h"
@@ -32,7 +33,7 @@ void ConflictLists::Take(std::span<const Vector> points) {
     blocks_[all.first_block + i / PointBlock::kSize].Set(i % PointBlock::kSize, points[i]);
   }
   sources_.push_back(all);
-  Distribute(targets);
+  Distribute(targets, true);
 }
 
 void ConflictLists::Take(std::span<const Vector> points, std::span<const TriangleId> seen,
@@ -108,7 +109,7 @@ void ConflictLists::InsertFrom(TriangleId id) {
   }
   const std::span<const TriangleId> targets = surface_.JoinToBoundary(vertices_, apex);
   if (lists_.size() < surface_.id_bound()) lists_.resize(2 * surface_.id_bound());
-  if (!sources_.empty()) Distribute(targets);
+  if (!sources_.empty()) Distribute(targets, false);
 }
 
 // Requires: a non-empty list.
@@ -126,7 +127,8 @@ Vector ConflictLists::RemoveFarthest(TriangleId id) {
 }
 
 // Moves the points of sources_ to targets that they see; points that see none are inside.
-void ConflictLists::Distribute(std::span<const TriangleId> targets) {
+// has_vertices: true if points may equal vertices other than the apex of all targets.
+void ConflictLists::Distribute(std::span<const TriangleId> targets, bool has_vertices) {
   size_t points = 0;
   for (const List& source : sources_) points += source.count;
   moved_ += points;
@@ -136,7 +138,7 @@ void ConflictLists::Distribute(std::span<const TriangleId> targets) {
   for (const List& source : sources_) {
     for (const PointBlock& block : BlocksOf(source)) source_blocks_.push_back(&block);
   }
-  Match(targets);
+  Match(targets, has_vertices);
   counts_.assign(targets.size() + 1, 0);
   const size_t lanes = source_blocks_.size() * PointBlock::kSize;
   for (size_t i = 0; i < lanes; ++i) ++counts_[static_cast<size_t>(matches_[i] + 1)];
@@ -146,14 +148,29 @@ void ConflictLists::Distribute(std::span<const TriangleId> targets) {
 }
 
 // Fills matches_, block by block of the sources, with indices of targets or kBelowAll.
-void ConflictLists::Match(std::span<const TriangleId> targets) {
+//
+// The limits of a plane are offset + bound and offset - bound. Rounding them errs by at most 6 u
+// |e||f| |corner|, which the slack of kPlaneErrorFactor covers. In an exact plane, only points
+// equal to a vertex need a test of their own. If only the apex comes into question, an inexact
+// plane, if there is one, finds these points uncertain.
+void ConflictLists::Match(std::span<const TriangleId> targets, bool has_vertices) {
   const double size = surface_.SizeWith(vertices_, Vector::Constant(size_));
+  const bool are_exact = std::all_of(targets.begin(), targets.end(), [this](TriangleId id) {
+    return surface_.triangle(id).slope == 0;
+  });
   planes_.clear();
   for (const TriangleId id : targets) {
     const SurfaceTriangle& t = surface_.triangle(id);
-    planes_.push_back({{t.normal.x(), t.normal.y(), t.normal.z()},
-                       t.offset,
-                       static_cast<double>(t.slope) * size});
+    double above = t.offset;
+    double below = t.offset;
+    if (t.slope != 0) {
+      const double bound = static_cast<double>(t.slope) * size;
+      above += bound;
+      below -= bound;
+    } else if (!has_vertices && !are_exact) {
+      below = std::nextafter(below, INFINITY);
+    }
+    planes_.push_back({{t.normal.x(), t.normal.y(), t.normal.z()}, above, below});
   }
   const size_t lanes = source_blocks_.size() * PointBlock::kSize;
   matches_.MakeRoom(lanes, 0);

@@ -72,8 +72,8 @@ class ConflictLists {
   void CountTaken(std::span<const Vector> points);
   void InsertFrom(TriangleId id);
   Vector RemoveFarthest(TriangleId id);
-  void Distribute(std::span<const TriangleId> targets);
-  void Match(std::span<const TriangleId> targets);
+  void Distribute(std::span<const TriangleId> targets, bool has_vertices);
+  void Match(std::span<const TriangleId> targets, bool has_vertices);
   int64_t MatchExactly(const Vector& point, std::span<const TriangleId> targets);
   void AllocateLists(std::span<const TriangleId> targets);
   void Scatter();
@@ -108,7 +108,7 @@ class ConflictLists {
   // one.
   std::vector<List> sources_;
   ScratchList<const PointBlock*> source_blocks_;
-  std::vector<PlaneWithBound> planes_;
+  std::vector<PlaneWithLimits> planes_;
   ScratchList<int64_t> matches_;
   std::vector<uint32_t> counts_;
   std::vector<size_t> cursors_;

@@ -10,50 +10,69 @@ namespace {
 using Lanes = double __attribute__((vector_size(32)));
 using Mask = int64_t __attribute__((vector_size(32)));
 
-// One body for both instruction sets. Not contracted to FMA, so both round identically.
-__attribute__((always_inline)) inline bool MatchPlanesBody(
-    std::span<const PointBlock* const> blocks, std::span<const PlaneWithBound> planes,
-    int64_t* matches) {
-  Mask are_uncertain = {0, 0, 0, 0};
-  for (const PointBlock* const at : blocks) {
-    const PointBlock& block = *at;
-    Lanes x;
-    Lanes y;
-    Lanes z;
+// Four points and their results so far.
+struct FourMatches {
+  explicit FourMatches(const PointBlock& block) {
     __builtin_memcpy(&x, block.x, sizeof(x));
     __builtin_memcpy(&y, block.y, sizeof(y));
     __builtin_memcpy(&z, block.z, sizeof(z));
-    Lanes best = {0, 0, 0, 0};
-    Mask match = {kBelowAll, kBelowAll, kBelowAll, kBelowAll};
-    Mask is_maybe_above = {0, 0, 0, 0};
-    int64_t index = 0;
-    for (const PlaneWithBound& plane : planes) {
-      const Lanes value =
-          (plane.normal[0] * x + plane.normal[1] * y + plane.normal[2] * z) - plane.offset;
-      const Mask is_better = (value > plane.bound) & (value > best);
-      best = is_better ? value : best;
-      match = is_better ? Mask{index, index, index, index} : match;
-      is_maybe_above |= ~(value < -plane.bound);
-      ++index;
-    }
+  }
+  __attribute__((always_inline)) void Test(const PlaneWithLimits& plane, const Mask& index) {
+    const Lanes product = plane.normal[0] * x + plane.normal[1] * y + plane.normal[2] * z;
+    const Lanes height = product - plane.above;
+    const Mask is_better = height > best;
+    best = is_better ? height : best;
+    match = is_better ? index : match;
+    is_maybe_above |= ~(product < plane.below);
+  }
+  // Writes the matches, and sets are_uncertain for uncertain points.
+  __attribute__((always_inline)) void Finish(int64_t* matches, Mask& are_uncertain) {
     const Mask is_uncertain = is_maybe_above & (match == kBelowAll);
-    are_uncertain |= is_uncertain;
     match += is_uncertain;
     __builtin_memcpy(matches, &match, sizeof(match));
-    matches += PointBlock::kSize;
+    are_uncertain |= is_uncertain;
+  }
+
+  Lanes x;
+  Lanes y;
+  Lanes z;
+  Lanes best = {0, 0, 0, 0};
+  Mask match = {kBelowAll, kBelowAll, kBelowAll, kBelowAll};
+  Mask is_maybe_above = {0, 0, 0, 0};
+};
+
+// One body for both instruction sets. Not contracted to FMA, so both round identically. Tests two
+// blocks at a time, because loading a plane takes as long as testing a block; the last block may be
+// tested twice.
+__attribute__((always_inline)) inline bool MatchPlanesBody(
+    std::span<const PointBlock* const> blocks, std::span<const PlaneWithLimits> planes,
+    int64_t* matches) {
+  Mask are_uncertain = {0, 0, 0, 0};
+  for (size_t i = 0; i < blocks.size(); i += 2) {
+    const size_t j = i + (i + 1 < blocks.size() ? 1 : 0);
+    FourMatches first(*blocks[i]);
+    FourMatches second(*blocks[j]);
+    Mask index = {0, 0, 0, 0};
+    for (const PlaneWithLimits& plane : planes) {
+      first.Test(plane, index);
+      second.Test(plane, index);
+      index += 1;
+    }
+    first.Finish(matches + i * PointBlock::kSize, are_uncertain);
+    second.Finish(matches + j * PointBlock::kSize, are_uncertain);
   }
   return (are_uncertain[0] | are_uncertain[1] | are_uncertain[2] | are_uncertain[3]) != 0;
 }
 static_assert(kUncertain == kBelowAll - 1);
 
 bool MatchPlanesBaseline(std::span<const PointBlock* const> blocks,
-                         std::span<const PlaneWithBound> planes, int64_t* matches) {
+                         std::span<const PlaneWithLimits> planes, int64_t* matches) {
   return MatchPlanesBody(blocks, planes, matches);
 }
 
 #ifdef HULLD_HAS_AVX2_PATH
 __attribute__((target("avx2"))) bool MatchPlanesAvx2(std::span<const PointBlock* const> blocks,
-                                                     std::span<const PlaneWithBound> planes,
+                                                     std::span<const PlaneWithLimits> planes,
                                                      int64_t* matches) {
   return MatchPlanesBody(blocks, planes, matches);
 }
@@ -97,7 +116,7 @@ __attribute__((target("avx2"))) size_t FarthestAlongAvx2(std::span<const PointBl
 
 }  // namespace
 
-bool MatchPlanes(std::span<const PointBlock* const> blocks, std::span<const PlaneWithBound> planes,
+bool MatchPlanes(std::span<const PointBlock* const> blocks, std::span<const PlaneWithLimits> planes,
                  int64_t* matches) {
 #ifdef HULLD_HAS_AVX2_PATH
   if (CurrentSimdPath() == SimdPath::kAvx2) return MatchPlanesAvx2(blocks, planes, matches);

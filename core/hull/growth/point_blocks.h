@@ -34,18 +34,16 @@ inline size_t BlocksFor(size_t points) {
   return (points + PointBlock::kSize - 1) / PointBlock::kSize;
 }
 
-// A plane in floating point: points with normal . p - offset > bound are certainly above it, points
-// with less than -bound are certainly below. An infinite bound leaves all points uncertain.
-struct PlaneWithBound {
+// A plane in floating point: points with normal . p > above are certainly above it, points with
+// normal . p < below are certainly below. Infinite limits leave all points uncertain.
+struct PlaneWithLimits {
   double normal[3];
-  double offset;
-  double bound;
+  double above;
+  double below;
 };
 
-inline bool IsCertainlyBelow(const PlaneWithBound& plane, const Vector& p) {
-  const double value =
-      (plane.normal[0] * p.x() + plane.normal[1] * p.y() + plane.normal[2] * p.z()) - plane.offset;
-  return value < -plane.bound;
+inline bool IsCertainlyBelow(const PlaneWithLimits& plane, const Vector& p) {
+  return plane.normal[0] * p.x() + plane.normal[1] * p.y() + plane.normal[2] * p.z() < plane.below;
 }
 
 // Results of MatchPlanes for a point that is certainly above no plane: certainly below all, or
@@ -53,11 +51,11 @@ inline bool IsCertainlyBelow(const PlaneWithBound& plane, const Vector& p) {
 inline constexpr int64_t kBelowAll = -1;
 inline constexpr int64_t kUncertain = -2;
 
-// Finds, for each point of the blocks, the plane with the largest normal . p - offset among the
+// Finds, for each point of the blocks, the plane with the largest normal . p - above among the
 // planes that the point is certainly above; kBelowAll or kUncertain if there is none. matches:
 // indices of planes, 4 per block. Returns true if some points are uncertain. Bit-identical with and
 // without AVX2.
-bool MatchPlanes(std::span<const PointBlock* const> blocks, std::span<const PlaneWithBound> planes,
+bool MatchPlanes(std::span<const PointBlock* const> blocks, std::span<const PlaneWithLimits> planes,
                  int64_t* matches);
 
 // Returns the index of the point, among the first `count`, with the largest component along the

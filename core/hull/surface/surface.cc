@@ -40,6 +40,17 @@ inline void SetPlane(SurfaceTriangle& t, const Vector& a, const Vector& b, const
   t.normal = Cross(e, f);
   t.offset = t.normal.dot(a);
   t.slope = static_cast<float>(slope * kPlaneSlopeRoundUp);
+  // Of the normal of a plane perpendicular to an axis, two components are 0.
+  if (t.normal.x() * t.normal.y() != 0) return;
+  for (Eigen::Index k = 0; k < 3; ++k) {
+    if (a[k] != b[k] || a[k] != c[k] || !(std::abs(t.normal[k]) > slope)) continue;
+    // The normal's sign is certain, and with length 1, so are the signs of all heights: x - a[k] is
+    // rounded once. Many facets of CAD models are perpendicular to an axis.
+    const double sign = t.normal[k] > 0 ? 1 : -1;
+    t.normal = sign * Vector::Unit(k);
+    t.offset = sign * a[k];
+    t.slope = 0;
+  }
 }
 
 }  // namespace

@@ -28,8 +28,9 @@ using TriangleId = uint32_t;
 // lies across the edge from corners[i] to corners[(i + 1) % 3]. The last corner is the apex: the
 // triangle was created when that vertex was added, as one of a fan around it.
 struct alignas(64) SurfaceTriangle {
-  // The rounded plane: normal . p - offset, which errs by at most slope * (|p| + |corner|), |.| the
-  // largest component.
+  // The rounded plane: normal . p - offset errs by at most slope * (|p| + |corner|), |.| the
+  // largest component. If the slope is 0, as for planes perpendicular to an axis, its sign is
+  // exact.
   Vector normal;
   double offset;
   std::array<VertexId, 3> corners;

@@ -322,6 +322,34 @@ TEST(HullBuilder, CountsCoverEveryPoint) {
   EXPECT_GT(total.inside, 500u);
 }
 
+// Large blocks. Most points occur several times and lie in facets that are perpendicular to an axis
+// or cut off corners, at any scale.
+TEST(HullBuilder, CountsCoverEveryPointInPlanesPerpendicularToAnAxis) {
+  const uint64_t seed = TestSeed(108);
+  Random random(seed);
+  uint64_t duplicate = 0;
+  for (int round = 0; round < kRounds / 50; ++round) {
+    const int side = random.Between(2, 9);
+    const int cut = random.Between(2 * side, 3 * side);
+    std::vector<Vector> points = RandomLatticePoints(random, random.Between(150, 900), side);
+    std::erase_if(points, [cut](const Vector& p) { return p.sum() > cut; });
+    const double scale = std::array{1.0, 0.1, 0x1p-1074, 1e300}[static_cast<size_t>(round) % 4];
+    points = Scaled(std::move(points), scale);
+    HullBuilder builder;
+    for (int block = 0; block < 2; ++block) {
+      const Hull before = builder.Snapshot();
+      const PointCounts counts = builder.Add(points).value();
+      const PointCounts expected = ExpectedCounts(before, builder.Snapshot(), points);
+      ASSERT_EQ(counts.outside, expected.outside) << "seed " << seed << " round " << round;
+      ASSERT_EQ(counts.duplicate, expected.duplicate) << "seed " << seed << " round " << round;
+      duplicate += counts.duplicate;
+      if (block == 0) Shuffle(random, points);
+    }
+    ASSERT_TRUE(AuditHull(builder.Snapshot()).ok()) << "seed " << seed << " round " << round;
+  }
+  EXPECT_GT(duplicate, 500u);
+}
+
 TEST(HullBuilder, NegativeZeroIsStoredAsZero) {
   const std::vector<Vector> signs = {{-0.0, 0.0, -0.0}, {0.0, -0.0, 0.0}, {1, -0.0, -0.0}};
   HullBuilder builder;
