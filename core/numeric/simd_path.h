@@ -3,7 +3,7 @@
 
 #include <atomic>
 
-// Defined if functions for AVX2 or for NEON exist in addition to the portable ones.
+// Defined if functions for AVX2 and AVX-512, or for NEON, exist in addition to the portable ones.
 #if defined(__x86_64__)
 #define HULLD_HAS_AVX2_PATH
 #elif defined(__aarch64__)
@@ -16,7 +16,8 @@ namespace hulld {
 enum class SimdPath {
   kPortable,  // the baseline that all code is compiled for
   kAvx2,
-  kNeon,  // on every 64-bit ARM; only for loops that the compiler does not vectorize
+  kAvx512,  // with VL and DQ; only for loops that need many registers, otherwise as kAvx2
+  kNeon,    // on every 64-bit ARM; only for loops that the compiler does not vectorize
 };
 
 namespace internal {
@@ -30,6 +31,12 @@ inline SimdPath CurrentSimdPath() {
 #else
   return SimdPath::kPortable;
 #endif
+}
+
+// Returns true if the current path includes the functions for AVX2.
+inline bool UsesAvx2() {
+  const SimdPath path = CurrentSimdPath();
+  return path == SimdPath::kAvx2 || path == SimdPath::kAvx512;
 }
 
 // Returns the best path of this machine.

@@ -185,7 +185,13 @@ void Remember(const FloatSearchResult& found, PairCache& cache) {
       return true;
     }
   }
-  SearchInFloatingPoint(pair, tolerance, first, max_error, found);
+  // The point between the centers serves as a corner unless the search must report vertices, or it
+  // is so near to the origin that rounding would dominate the next direction.
+  constexpr double kMinDistance = 0x1p-10;
+  const PlainVector inner = -n;
+  const bool starts_inside = purpose == Purpose::kRelation && tolerance == 0 && cache == nullptr &&
+                             LargestComponent(inner) > kMinDistance * pair.size();
+  SearchInFloatingPoint(pair, tolerance, first, max_error, starts_inside ? &inner : nullptr, found);
   decision.directions_tried += found.directions_tried;
   if (cache != nullptr) Remember(found, *cache);
   if (found.verdict == FloatVerdict::kUndecided) return false;

@@ -119,7 +119,7 @@ __attribute__((target("avx2"))) size_t FarthestAlongAvx2(std::span<const PointBl
 bool MatchPlanes(std::span<const PointBlock* const> blocks, std::span<const PlaneWithLimits> planes,
                  int64_t* matches) {
 #ifdef HULLD_HAS_AVX2_PATH
-  if (CurrentSimdPath() == SimdPath::kAvx2) return MatchPlanesAvx2(blocks, planes, matches);
+  if (UsesAvx2()) return MatchPlanesAvx2(blocks, planes, matches);
 #endif
   return MatchPlanesBaseline(blocks, planes, matches);
 }
@@ -127,7 +127,7 @@ bool MatchPlanes(std::span<const PointBlock* const> blocks, std::span<const Plan
 size_t FarthestAlong(std::span<const PointBlock> blocks, size_t count, const Vector& direction) {
   HULLD_CHECK(count > 0 && BlocksFor(count) <= blocks.size());
 #ifdef HULLD_HAS_AVX2_PATH
-  if (CurrentSimdPath() == SimdPath::kAvx2) return FarthestAlongAvx2(blocks, count, direction);
+  if (UsesAvx2()) return FarthestAlongAvx2(blocks, count, direction);
 #endif
   return FarthestAlongBody(blocks, count, direction);
 }

@@ -143,7 +143,7 @@ void DirectionMap::AppendSurvivors(std::span<const Vector> points, std::vector<u
   constexpr size_t kChunk = 1024;
   // Extra capacity, because four indices are written together.
   std::array<uint32_t, kChunk + 4> buffer;
-  const bool has_avx2 = CurrentSimdPath() == SimdPath::kAvx2 && rejects_;
+  const bool has_avx2 = UsesAvx2() && rejects_;
   for (size_t first = 0; first < points.size() && !poll.Step(); first += kChunk) {
     const std::span<const Vector> chunk =
         points.subspan(first, std::min(kChunk, points.size() - first));

@@ -284,8 +284,7 @@ std::optional<BetweenTimes> FindEntry(const FloatPair& start, const RelativePath
   const std::array<PlainVector, 3> corners = {
       start.Difference(ordered[0]), start.Difference(ordered[1]), start.Difference(ordered[2])};
   if (!CrossesInside(start, path, corners)) return std::nullopt;
-  const auto find_crossing =
-      CurrentSimdPath() == SimdPath::kAvx2 ? FindCrossingAvx2 : FindCrossingPortably;
+  const auto find_crossing = UsesAvx2() ? FindCrossingAvx2 : FindCrossingPortably;
   const std::optional<CrossingTime> time = find_crossing(start, path, X_WA, X_WB, ordered);
   // The path enters if it runs against the normal.
   if (!time || !Supports(start, ordered, corners, -time->sign)) return std::nullopt;

@@ -151,9 +151,8 @@ SeparationBounds WalkSmallAvx2(const FloatPair& pair, const PlainVector& n,
 template <uint32_t kMaxVertices>
 SeparationBounds WalkSmall(const FloatPair& pair, const PlainVector& n,
                            std::span<const VertexPair> start, const SeparationGoal& goal) {
-  return CurrentSimdPath() == SimdPath::kAvx2
-             ? WalkSmallAvx2<kMaxVertices>(pair, n, start, goal)
-             : WalkSmallPortably<kMaxVertices>(pair, n, start, goal);
+  return UsesAvx2() ? WalkSmallAvx2<kMaxVertices>(pair, n, start, goal)
+                    : WalkSmallPortably<kMaxVertices>(pair, n, start, goal);
 }
 
 // Returns the weights of the corners of a simplex in its point nearest to the origin, if that point

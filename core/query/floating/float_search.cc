@@ -19,8 +19,8 @@ namespace {
 // Observed: random pairs of 10000 vertices, 1e-6 apart, need 18 on average.
 constexpr uint64_t kMaxDirections = 64;
 
-// Returns true if the origin is certainly strictly inside a tetrahedron of computed Minkowski
-// vertices.
+// Returns true if the origin is certainly strictly inside a tetrahedron of points of A - B, each
+// computed within kMinkowskiErrorFactor.
 template <typename Pair>
 bool ContainsOrigin(const Pair& pair, const PlainVector& p, const PlainVector& q,
                     const PlainVector& r, const PlainVector& s) {
@@ -65,19 +65,26 @@ class FloatSearch {
   FloatSearch(const Pair& pair, double tolerance, double max_error, Simplex& simplex)
       : pair_(pair), tolerance_(tolerance), max_error_(max_error), simplex_(simplex) {}
 
-  void Run(const PlainVector& first, FloatSearchResult& result) {
+  void Run(const PlainVector& first, const PlainVector* inner, FloatSearchResult& result) {
     LaneVector n(IsZero(first) ? PlainVector(1, 0, 0) : first);
+    if (inner != nullptr) simplex_.Set(LaneVector(*inner), kInner);
     while (tried_ < kMaxDirections && Explore(n)) {
     }
     result.verdict = verdict_;
     result.axis = verdict_ == FloatVerdict::kSeparated ? axis_ : along_;
     result.reach = reach_;
     result.directions_tried = tried_;
-    result.pair_count = simplex_.count();
-    for (uint32_t i = 0; i < simplex_.count(); ++i) result.pairs[i] = simplex_.pair(i);
+    // With an inner point, only hints for exact arithmetic are needed.
+    if (inner != nullptr && verdict_ != FloatVerdict::kUndecided) return;
+    for (uint32_t i = 0; i < simplex_.count(); ++i) {
+      if (simplex_.pair(i) != kInner) result.pairs[result.pair_count++] = simplex_.pair(i);
+    }
   }
 
  private:
+  // Stands for the inner point among the corners; no vertices have these numbers.
+  static constexpr VertexPair kInner = {UINT32_MAX - 1, UINT32_MAX - 1};
+
   // Explores along n and sets n to the next direction. Returns false if the search is over.
   bool Explore(LaneVector& n) {
     double largest = LargestComponent(n.plain());
@@ -179,10 +186,10 @@ class FloatSearch {
 // Pair: a FloatPair or a SmallPair.
 template <typename Pair>
 void SearchPortably(const FloatPair& pair, double tolerance, const PlainVector& first,
-                    double max_error, FloatSearchResult& result) {
+                    double max_error, const PlainVector* inner, FloatSearchResult& result) {
   const Pair own(pair);
   Simplex simplex;
-  FloatSearch(own, tolerance, max_error, simplex).Run(first, result);
+  FloatSearch(own, tolerance, max_error, simplex).Run(first, inner, result);
 }
 
 #ifdef HULLD_HAS_AVX2_PATH
@@ -191,46 +198,66 @@ template <typename Pair>
 __attribute__((target("avx2"), flatten)) void SearchByAvx2(const FloatPair& pair, double tolerance,
                                                            const PlainVector& first,
                                                            double max_error,
+                                                           const PlainVector* inner,
                                                            FloatSearchResult& result) {
   const Pair own(pair);
   Simplex simplex;
-  FloatSearch(own, tolerance, max_error, simplex).Run(first, result);
+  FloatSearch(own, tolerance, max_error, simplex).Run(first, inner, result);
 }
-#else
-template <typename Pair>
-void SearchByAvx2(const FloatPair& pair, double tolerance, const PlainVector& first,
-                  double max_error, FloatSearchResult& result) {
-  SearchPortably<Pair>(pair, tolerance, first, max_error, result);
-}
-#endif
 
 #ifdef HULLD_HAS_LANE_LOOKUP
-using EightForAvx2 = SmallPair<8, true>;
+using EightForAvx2 = SmallPair<8, LaneLookup>;
+using EightForAvx512 = SmallPair<8, LanePermutation>;
 #else
 using EightForAvx2 = SmallPair<8>;
+using EightForAvx512 = SmallPair<8>;
 #endif
 
-template <typename Pair, typename PairForAvx2 = Pair>
+// AVX-512 has enough registers for all vertices. Observed: 11 % faster; larger pairs gain nothing.
+__attribute__((target("avx512vl,avx512dq"), flatten)) void SearchEightByAvx512(
+    const FloatPair& pair, double tolerance, const PlainVector& first, double max_error,
+    const PlainVector* inner, FloatSearchResult& result) {
+  const EightForAvx512 own(pair);
+  Simplex simplex;
+  FloatSearch(own, tolerance, max_error, simplex).Run(first, inner, result);
+}
+#endif
+
+template <typename Pair>
 void Search(const FloatPair& pair, double tolerance, const PlainVector& first, double max_error,
-            FloatSearchResult& result) {
-  if (CurrentSimdPath() == SimdPath::kAvx2) {
-    SearchByAvx2<PairForAvx2>(pair, tolerance, first, max_error, result);
-  } else {
-    SearchPortably<Pair>(pair, tolerance, first, max_error, result);
+            const PlainVector* inner, FloatSearchResult& result) {
+#ifdef HULLD_HAS_AVX2_PATH
+  if (UsesAvx2()) {
+    return SearchByAvx2<Pair>(pair, tolerance, first, max_error, inner, result);
   }
+#endif
+  SearchPortably<Pair>(pair, tolerance, first, max_error, inner, result);
+}
+
+void SearchEight(const FloatPair& pair, double tolerance, const PlainVector& first,
+                 double max_error, const PlainVector* inner, FloatSearchResult& result) {
+#ifdef HULLD_HAS_AVX2_PATH
+  if (CurrentSimdPath() == SimdPath::kAvx512) {
+    return SearchEightByAvx512(pair, tolerance, first, max_error, inner, result);
+  }
+  if (UsesAvx2()) {
+    return SearchByAvx2<EightForAvx2>(pair, tolerance, first, max_error, inner, result);
+  }
+#endif
+  SearchPortably<SmallPair<8>>(pair, tolerance, first, max_error, inner, result);
 }
 
 }  // namespace
 
 void SearchInFloatingPoint(const FloatPair& pair, double tolerance, const PlainVector& first,
-                           double max_error, FloatSearchResult& result) {
+                           double max_error, const PlainVector* inner, FloatSearchResult& result) {
   HULLD_DCHECK(pair.usable());
   if (SmallPair<8>::Fits(pair)) {
-    Search<SmallPair<8>, EightForAvx2>(pair, tolerance, first, max_error, result);
+    SearchEight(pair, tolerance, first, max_error, inner, result);
   } else if (SmallPair<16>::Fits(pair)) {
-    Search<SmallPair<16>>(pair, tolerance, first, max_error, result);
+    Search<SmallPair<16>>(pair, tolerance, first, max_error, inner, result);
   } else {
-    Search<FloatPair>(pair, tolerance, first, max_error, result);
+    Search<FloatPair>(pair, tolerance, first, max_error, inner, result);
   }
 }
 

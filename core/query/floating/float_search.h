@@ -37,17 +37,19 @@ inline constexpr double kEndsAtSign = -1;
 // the separation is at most `max_error`, up to rounding. The walk may err; every claim is
 // certified.
 // SEPARATED: the support value is below -SupportError. OVERLAPPING: the origin is inside a
-// tetrahedron of vertices of A - B by more than the error of its volumes. WITHIN_TOLERANCE: a point
+// tetrahedron of points of A - B by more than the error of its volumes. WITHIN_TOLERANCE: a point
 // of A - B and a supporting plane of A - B are both within the tolerance of the origin. `first`:
-// the initial direction, for example from A's center to B's. Fills `result`, which must be newly
-// constructed. Requires: pair.usable().
+// the initial direction, for example from A's center to B's. `inner`: null, or a point of A - B,
+// computed within kMinkowskiErrorFactor, as the first corner of the simplex. If it is well inside,
+// it saves directions (observed: half of one on average). A decided result then has no pairs.
+// Fills `result`, which must be newly constructed. Requires: pair.usable().
 void SearchInFloatingPoint(const FloatPair& pair, double tolerance, const PlainVector& first,
-                           double max_error, FloatSearchResult& result);
+                           double max_error, const PlainVector* inner, FloatSearchResult& result);
 inline FloatSearchResult SearchInFloatingPoint(const FloatPair& pair, double tolerance,
                                                const PlainVector& first,
                                                double max_error = kEndsAtSign) {
   FloatSearchResult result;
-  SearchInFloatingPoint(pair, tolerance, first, max_error, result);
+  SearchInFloatingPoint(pair, tolerance, first, max_error, nullptr, result);
   return result;
 }
 

@@ -58,6 +58,21 @@ class LaneLookup {
   Halves halves_;
   LaneIds upper_;
 };
+
+// The same as one permutation of two registers, which exists with AVX-512.
+class LanePermutation {
+ public:
+  [[gnu::always_inline]] explicit LanePermutation(const LaneIds& index) : index_(index) {}
+  [[gnu::always_inline]] void Find(const double* table, Lanes& found) const {
+    Lanes low, high;
+    Load(table, low);
+    Load(table + 4, high);
+    found = __builtin_shuffle(low, high, index_);
+  }
+
+ private:
+  LaneIds index_;
+};
 #endif
 
 // A vector with each coordinate in all four lanes of a register.

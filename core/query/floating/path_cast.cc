@@ -210,8 +210,8 @@ PathCast CastSmallAvx2(const FloatPair& start, const RelativePath& path) {
 
 template <uint32_t kMaxVertices>
 PathCast CastSmall(const FloatPair& start, const RelativePath& path) {
-  return CurrentSimdPath() == SimdPath::kAvx2 ? CastSmallAvx2<kMaxVertices>(start, path)
-                                              : CastSmallPortably<kMaxVertices>(start, path);
+  return UsesAvx2() ? CastSmallAvx2<kMaxVertices>(start, path)
+                    : CastSmallPortably<kMaxVertices>(start, path);
 }
 
 }  // namespace

@@ -46,6 +46,10 @@ class Simplex {
   // contains the origin. Requires: 0 < count() < 4.
   [[gnu::always_inline]] bool Add(const LaneVector& p, VertexPair pair, LaneVector& n) {
     HULLD_DCHECK(count_ > 0 && count_ < 4);
+    if (count_ == 1) {
+      AddToVertex(p, pair, n);
+      return true;
+    }
     const Lanes zero = {0, 0, 0, 0};
     // Lane i: the edges e, f, and g from p to the corners of lanes i, i + 1, and i + 2.
     Lanes ex, ey, ez, fx, fy, fz, gx, gy, gz;
@@ -166,6 +170,7 @@ class Simplex {
  private:
   // Parts with p: 0 to 2 are the faces, with the corners of lanes i and i + 1; 3 to 5 are the
   // edges, with that of lane i - 3; 6 is p alone, 7 the tetrahedron.
+  static constexpr uint32_t kFirstEdge = 3;
   static constexpr uint32_t kAlone = 6;
   static constexpr uint32_t kWhole = 7;
   static constexpr uint32_t kCount[7] = {3, 3, 3, 2, 2, 2, 1};
@@ -212,6 +217,25 @@ class Simplex {
     }
     Keep(kept, LaneVector(p), pair);
     return nearest.toward;
+  }
+  // Adds p as the rest of Add() would, with the same result. Requires: count() is 1.
+  [[gnu::always_inline]] void AddToVertex(const LaneVector& p, VertexPair pair, LaneVector& n) {
+    const Lanes ex = Lanes{x_[0], x_[0], x_[0], x_[0]} - p.x;
+    const Lanes ey = Lanes{y_[0], y_[0], y_[0], y_[0]} - p.y;
+    const Lanes ez = Lanes{z_[0], z_[0], z_[0], z_[0]} - p.z;
+    const Lanes ep = (ex * p.x + ey * p.y) + ez * p.z;
+    if (ep[0] < 0) [[likely]] {
+      const Lanes ee = (ex * ex + ey * ey) + ez * ez;
+      n.x = ep * ex - ee * p.x;
+      n.y = ep * ey - ee * p.y;
+      n.z = ep * ez - ee * p.z;
+      Keep(kFirstEdge, p, pair);
+    } else {
+      n.x = -p.x;
+      n.y = -p.y;
+      n.z = -p.z;
+      Keep(kAlone, p, pair);
+    }
   }
   // Keeps the corners of a part, with p.
   [[gnu::always_inline]] void Keep(uint32_t part, const LaneVector& p, VertexPair pair) {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <cstring>
 #include <span>
+#include <type_traits>
 
 #include "core/base/check.h"
 #include "core/query/floating/float_pair.h"
@@ -21,9 +22,9 @@ namespace hulld {
 //
 // kMaxVertices: the maximum number of vertices of either hull; more would need separate bounds
 // (kSupportErrorFactor). Positions have the same bits as in FloatPair. Everything is inlined, so
-// that it is compiled for the registers of the calling search. kLooksUp: positions are looked up in
-// registers (LaneLookup), with the same result.
-template <uint32_t kMaxVertices, bool kLooksUp = false>
+// that it is compiled for the registers of the calling search. InRegisters: LaneLookup or
+// LanePermutation, to look up positions in registers with the same result; void to load them.
+template <uint32_t kMaxVertices, typename InRegisters = void>
 class SmallPair {
   static_assert(kMaxVertices == 8 || kMaxVertices == 16);
 
@@ -54,15 +55,13 @@ class SmallPair {
   // Like Farthest above; also sets w to the vertex.
   [[gnu::always_inline]] FloatPair::Support Farthest(const LaneVector& n, LaneVector& w) const {
     VertexPair place;
-    if constexpr (kLooksUp) {
-#ifdef HULLD_HAS_LANE_LOOKUP
+    if constexpr (!std::is_void_v<InRegisters>) {
       static_assert(kMaxVertices == 8);
       LaneIds best_a, best_b;
       a_.BestOfAll(n, best_a);
       against_b_.BestOfAll(n, best_b);
-      AddUp(LaneLookup(best_a), LaneLookup(best_b), w);
+      AddUp(InRegisters(best_a), InRegisters(best_b), w);
       place = {PlaceOf(best_a[0]), PlaceOf(best_b[0])};
-#endif
     } else {
       place = PlaceAlong(n);
       AddUp(Loading{place.a}, Loading{place.b}, w);

@@ -135,7 +135,7 @@ SupportPoint ScanNeon(std::span<const SupportBlock> blocks, const PlainVector& n
 
 SupportPoint Scan(std::span<const SupportBlock> blocks, const PlainVector& n) {
 #ifdef HULLD_HAS_AVX2_PATH
-  if (CurrentSimdPath() == SimdPath::kAvx2) return ScanAvx2(blocks, n);
+  if (UsesAvx2()) return ScanAvx2(blocks, n);
 #endif
 #ifdef HULLD_HAS_NEON_PATH
   if (CurrentSimdPath() == SimdPath::kNeon) return ScanNeon(blocks, n);

@@ -219,8 +219,7 @@ void FilterAvx2(const FacePoints& from, const Square& square, double bound, Face
 #endif
 
 void Filter(const FacePoints& from, const Square& square, double bound, FacePoints& to) {
-  CurrentSimdPath() == SimdPath::kAvx2 ? FilterAvx2(from, square, bound, to)
-                                       : FilterPortably(from, square, bound, to);
+  UsesAvx2() ? FilterAvx2(from, square, bound, to) : FilterPortably(from, square, bound, to);
 }
 
 }  // namespace

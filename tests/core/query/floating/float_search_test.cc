@@ -5,6 +5,7 @@
 #include <iterator>
 #include <span>
 
+#include "core/numeric/simd_path.h"
 #include "core/query/collision.h"
 #include "core/query/floating/float_distance.h"
 #include "tests/core/checks/oracle_bridge.h"
@@ -38,6 +39,52 @@ struct RandomPair {
   PlacedHull a = *PlacedHull::Make(query_a, Pose());
   PlacedHull b = *PlacedHull::Make(query_b, Pose());
 };
+
+// The inner point is no vertex, so it is not among the pairs, which are hints if nothing is
+// decided.
+TEST(FloatSearch, AnInnerPointSavesDirectionsOnEverySimdPath) {
+  Random random(20261129);
+  uint64_t directions[2] = {};
+  int verdicts[4] = {};
+  for (int round = 0; round < 600; ++round) {
+    const int vertices = round % 3 == 0 ? 8 : round % 3 == 1 ? 14 : 100;
+    RandomPair hulls(random, vertices, vertices, 1.9);
+    // Vertex on vertex: nothing but exact arithmetic decides.
+    const bool touches = round % 8 == 0;
+    if (touches) {
+      hulls.X_WB.t = hulls.hull_a.vertices().back() - hulls.hull_b.vertices().front();
+      hulls.b = *PlacedHull::Make(hulls.query_b, hulls.X_WB);
+    }
+    const FloatPair pair(hulls.a, hulls.b);
+    const PlainVector inner = pair.CenterDifference();
+    const FloatSearchResult plain = SearchInFloatingPoint(pair, 0, -inner);
+    FloatSearchResult found;
+    SearchInFloatingPoint(pair, 0, -inner, kEndsAtSign, &inner, found);
+    EXPECT_EQ(found.verdict, plain.verdict) << "round " << round;
+    ++verdicts[static_cast<int>(found.verdict)];
+    directions[0] += plain.directions_tried;
+    directions[1] += found.directions_tried;
+    for (uint32_t i = 0; i < found.pair_count; ++i) {
+      EXPECT_LT(found.pairs[i].a, hulls.query_a.point_count());
+      EXPECT_LT(found.pairs[i].b, hulls.query_b.point_count());
+    }
+    const bool is_undecided = found.verdict == FloatVerdict::kUndecided;
+    EXPECT_EQ(found.pair_count > 0, is_undecided) << "round " << round;
+    for (const SimdPath path : {SimdPath::kPortable, SimdPath::kAvx2}) {
+      if (!UseSimdPath(path)) continue;
+      FloatSearchResult other;
+      SearchInFloatingPoint(pair, 0, -inner, kEndsAtSign, &inner, other);
+      EXPECT_EQ(other.verdict, found.verdict) << "round " << round;
+      EXPECT_EQ(other.axis, found.axis) << "round " << round;
+      EXPECT_EQ(other.directions_tried, found.directions_tried) << "round " << round;
+    }
+    UseSimdPath(BestSimdPath());
+  }
+  EXPECT_LT(directions[1], directions[0]);
+  EXPECT_GT(verdicts[static_cast<int>(FloatVerdict::kSeparated)], 50);
+  EXPECT_GT(verdicts[static_cast<int>(FloatVerdict::kOverlapping)], 50);
+  EXPECT_GT(verdicts[static_cast<int>(FloatVerdict::kUndecided)], 50);
+}
 
 // Half the width is the error, so the end of the search may be twice as far from the nearest point.
 TEST(FloatSearch, ASeparatedPairIsSearchedUntilTheErrorIsReached) {
