@@ -19,7 +19,7 @@
 #include "server/call/pulled_stream.h"
 #include "server/call/service_parts.h"
 #include "server/collisions/claimed_range.h"
-#include "server/collisions/collision_calls.h"
+#include "server/collisions/collision_service.h"
 #include "server/collisions/placed/live_pairs.h"
 #include "server/collisions/placed/placed_answer.h"
 #include "server/collisions/placed/placement_table.h"

@@ -14,7 +14,7 @@
 #include "hulld/v1/collision.pb.h"
 #include "server/call/service_parts.h"
 #include "server/call/unary_call.h"
-#include "server/collisions/collision_calls.h"
+#include "server/collisions/collision_service.h"
 #include "server/collisions/placed/placed_answer.h"
 #include "server/collisions/placed/placement_table.h"
 #include "server/collisions/placed/query_settings.h"

@@ -16,7 +16,7 @@
 #include "core/query/motion/first_contact.h"
 #include "core/query/scene/scene.h"
 #include "hulld/v1/collision.pb.h"
-#include "server/collisions/collision_calls.h"
+#include "server/collisions/collision_service.h"
 #include "server/collisions/pieced_replies.h"
 #include "server/collisions/placed/placed_answer.h"
 #include "server/collisions/placed/placement_table.h"

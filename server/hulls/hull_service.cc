@@ -8,7 +8,6 @@
 #include "hulld/v1/hull.grpc.pb.h"
 #include "server/call/call.h"
 #include "server/call/unary_call.h"
-#include "server/hulls/hull_streams.h"
 #include "server/wire/decode.h"
 #include "server/wire/encode.h"
 #include "server/wire/fresh_answer.h"

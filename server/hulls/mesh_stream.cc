@@ -12,7 +12,7 @@
 #include "server/call/pulled_stream.h"
 #include "server/call/service_parts.h"
 #include "server/contract/errors.h"
-#include "server/hulls/hull_streams.h"
+#include "server/hulls/hull_service.h"
 #include "server/settings/config.h"
 #include "server/wire/decode.h"
 #include "server/wire/encode.h"

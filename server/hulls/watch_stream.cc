@@ -13,7 +13,7 @@
 #include "hulld/v1/hull.pb.h"
 #include "server/call/pulled_stream.h"
 #include "server/call/service_parts.h"
-#include "server/hulls/hull_streams.h"
+#include "server/hulls/hull_service.h"
 #include "server/registry/watch/change_feed.h"
 #include "server/wire/encode.h"
 

@@ -1,5 +1,3 @@
-#include "server/collisions/watch/collision_watch.h"
-
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
 #include <grpcpp/grpcpp.h>
@@ -18,12 +16,13 @@
 #include "hulld/v1/collision.pb.h"
 #include "server/call/queued_stream.h"
 #include "server/call/service_parts.h"
+#include "server/collisions/collision_service.h"
 #include "server/collisions/placed/live_pairs.h"
 #include "server/collisions/placed/placed_answer.h"
 #include "server/collisions/placed/placement_table.h"
 #include "server/collisions/placed/query_settings.h"
 #include "server/collisions/placed/scene_groups.h"
-#include "server/collisions/watch/watched_hulls.h"
+#include "server/collisions/watched_hulls.h"
 #include "server/contract/errors.h"
 #include "server/process/task_pool.h"
 #include "server/settings/config.h"
@@ -33,7 +32,7 @@ namespace hulld::server {
 namespace {
 
 // Pairs between two reads of the clock.
-constexpr size_t kPairsPerPoll = 16;
+constexpr size_t kWatchedPairsPerPoll = 16;
 // Rounds per watch, over which preparation pays off; a guess.
 constexpr uint64_t kExpectedRounds = 256;
 // Tag and length of an entry within its message.
@@ -259,7 +258,7 @@ class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchC
       const absl::Status status = AnswerPair(pairs_.pair(selected[next_pair_++]));
       if (!status.ok()) return EndWork(status);
       is_full = reply_bytes_ >= Config::kReplyMessageBytes;
-      if (!table_.has_bodies() && next_pair_ % kPairsPerPoll != 0) continue;
+      if (!table_.has_bodies() && next_pair_ % kWatchedPairsPerPoll != 0) continue;
       if (call().ShouldStop()) return EndWork(call().StopStatus());
       if (std::chrono::steady_clock::now() >= end) return RunOn(lane_, [this] { SendRound(); });
     }
