@@ -39,7 +39,7 @@ Registry::~Registry() {
 absl::Status Registry::Load() {
   Locked locked(state_.mutex);
   Store& store = state_.store;
-  state_.Begin(store.revision(), records_);
+  state_.feed.Begin(store.revision(), records_);
   if (state_.is_cache()) {
     state_.SetTotals(store.totals());
   } else {

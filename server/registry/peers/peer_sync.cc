@@ -154,7 +154,7 @@ void PeerSync::Apply(Locked& locked, const PeerChanges& changes) {
     state_.bodies.DropSome(locked);
   }
   if (state_.is_cache() && changes.revision > 0) state_.SetTotals(changes.totals);
-  if (changes.revision > state_.revision()) state_.ApplyOther(locked, changes.revision);
+  if (changes.revision > state_.revision()) state_.feed.NoteOther(locked, changes.revision);
   state_.memory.Evict(locked);
   // Tasks deferred by these tasks wait for the next changes.
   for (const LockedTask& task : std::exchange(deferred_, {})) task(locked);

@@ -50,17 +50,6 @@ RegistryState::RegistryState(Store& store_in, const Limits& limits_in,
   bodies.KeepAtMost(limits.memory_limit / kBodiesShare);
 }
 
-void RegistryState::Begin(uint64_t revision, PageSource& pages) {
-  HULLD_CHECK(hulls.size() == 0 && revision_ == 0);
-  revision_ = revision;
-  feed.Begin(revision, pages);
-}
-
-void RegistryState::Publish(uint64_t revision) {
-  HULLD_CHECK(revision > revision_);
-  revision_ = revision;
-}
-
 HullPointer RegistryState::Find(const std::string& id) {
   std::optional<HullPointer> hull = hulls.Ask(id);
   HULLD_CHECK(hull.has_value() || bodies.contains(id));
@@ -166,7 +155,7 @@ absl::Status RegistryState::CheckHullCount() const {
 }
 
 RegistrySizes RegistryState::Sizes() const {
-  return {revision_, HullCount() - creating_hulls_, vertex_count_, kept_bodies_};
+  return {revision(), HullCount() - creating_hulls_, vertex_count_, kept_bodies_};
 }
 
 void RegistryState::EndCreatingHull(Locked& locked, const HullPointer& hull,
@@ -201,14 +190,12 @@ void RegistryState::ApplyCreation(Locked& locked, const HullPointer& former,
     hulls.Insert(hull);
   }
   NoteVertices(0, stored.record.vertex_count);
-  Publish(stored.record.revision);
   NoteChange(*hull);
   feed.NotePresent(locked, replaced, hull, nullptr);
 }
 
 void RegistryState::ApplyDeletion(Locked& locked, const HullPointer& hull, uint64_t revision) {
   const HullRecord& record = hull->committed().record;
-  Publish(revision);
   NoteVertices(record.vertex_count, 0);
   --kept_hulls_;
   NoteChange(*hull);
@@ -223,7 +210,6 @@ void RegistryState::ApplyChunk(Locked& locked, const HullPointer& hull,
   hull->Commit(locked, chunk.hull, chunk.mark, chunk.writer, chunk.vertices);
   NoteChange(*hull);
   if (after.revision != before.revision) {
-    Publish(after.revision);
     NoteVertices(before.vertex_count, after.vertex_count);
     feed.NotePresent(locked, Incarnation::Of(before), hull, nullptr);
   }
@@ -234,7 +220,6 @@ void RegistryState::ApplyBody(Locked& locked, const std::string& id,
                               const std::shared_ptr<const Body>& body, uint64_t revision) {
   std::optional<Incarnation> former;
   if (const auto known = FindBody(id)) former = Incarnation::Of(known->record());
-  Publish(revision);
   // For readers that look for a hull with this ID.
   recent_changes.Note(id);
   bodies.Set(locked, id, body);
@@ -252,12 +237,9 @@ HullPointer RegistryState::ApplyPeerChange(Locked& locked, const std::string& id
   HullPointer hull = hulls.Find(id);
   // False for changes that were part of the initial load.
   const bool is_new = change.revision > revision();
-  if (is_new) {
-    Publish(change.revision);
-    // Includes hulls that were created and deleted in between, because a reader must learn of that,
-    // too.
-    recent_changes.Note(id);
-  }
+  // Includes hulls that were created and deleted in between, because a reader must learn of that,
+  // too.
+  if (is_new) recent_changes.Note(id);
   if (hull != nullptr) {
     if (ApplyPeerVersion(locked, hull, change, is_new)) return hull;
     EndFormer(locked, hull, change);
@@ -351,11 +333,6 @@ void RegistryState::Note(Locked& locked, const std::string& id, const PeerChange
     // A damaged record cannot be described.
     feed.NoteOther(locked, change.revision);
   }
-}
-
-void RegistryState::ApplyOther(Locked& locked, uint64_t revision) {
-  Publish(revision);
-  feed.NoteOther(locked, revision);
 }
 
 void RegistryState::Prepare(Locked& locked, RegisteredHull& hull) {

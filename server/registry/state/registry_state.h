@@ -27,7 +27,7 @@ namespace hulld::server {
 
 // State shared by the parts of a registry, and its state machine. All parts read committed state
 // here. The Apply functions are the only ones that change what readers see. Each applies one
-// committed change, publishes its revision, and notes it in the feed. Never blocks.
+// committed change and notes it in the feed, which keeps the revision. Never blocks.
 //
 // Invariants:
 // - Revisions are applied in increasing order, and each change atomically, within one hold of the
@@ -58,11 +58,8 @@ class RegistryState {
 
   // True if the tables cache records that the store can find.
   bool is_cache() const { return is_cache_; }
-  // Last committed and visible revision; 0 before Begin.
-  uint64_t revision() const { return revision_; }
-  // Starts at this revision of the store with empty tables. Existing hulls are read from `pages`.
-  // Must be called first.
-  void Begin(uint64_t revision, PageSource& pages);
+  // Last committed and visible revision; 0 before ChangeFeed::Begin.
+  uint64_t revision() const { return feed.revision(); }
 
   // Returns true if the ID's state is known, including absence. Cost: O(log n).
   bool IsKnown(const std::string& id) const { return hulls.Knows(id) || bodies.contains(id); }
@@ -130,8 +127,6 @@ class RegistryState {
   // ended, whose waiting tasks must resume; null if there is none.
   HullPointer ApplyPeerChange(Locked& locked, const std::string& id, const PeerChange& change,
                               uint64_t since);
-  // Applies a revision whose change cannot be described.
-  void ApplyOther(Locked& locked, uint64_t revision);
 
   // Prepares the committed state of a hull, after queries have paid for it (WantsPreparing), on
   // this thread. Releases the mutex. Requires: the hull has points in memory, and no thread
@@ -157,7 +152,6 @@ class RegistryState {
   ChangeFeed feed;
 
  private:
-  void Publish(uint64_t revision);
   // Records a reader-visible change of the hull.
   void NoteChange(const RegisteredHull& hull);
   // Updates the vertex total after a hull's count changed.
@@ -177,7 +171,6 @@ class RegistryState {
             const std::optional<Incarnation>& former);
 
   const bool is_cache_;
-  uint64_t revision_ = 0;
   uint64_t vertex_count_ = 0;
   // Numbers of hulls and bodies in the store at revision_ (hulls: only if the table is a cache),
   // and of uncommitted creations. Changed under the mutex.

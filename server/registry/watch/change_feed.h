@@ -251,6 +251,8 @@ class ChangeFeed {
   // Begins at the revision of the loaded store. Existing hulls are read from `pages`. Call before
   // all other functions.
   void Begin(uint64_t revision, PageSource& pages);
+  // Revision of the last noted change. Requires the mutex.
+  uint64_t revision() const { return revision_; }
 
   // Note a committed change at the revision of its record, or at `revision`. body: null for a
   // change of a hull. former: the incarnation that had the ID before, possibly the same one;
@@ -311,9 +313,9 @@ class ChangeFeed {
 
   std::shared_ptr<WatchGroup> GroupOf(const WatchTarget& target);
   void RemoveGroup(const std::shared_ptr<WatchGroup>& group);
-  void RemoveId(const std::string& id, const std::shared_ptr<WatchGroup>& group);
+  static void Remove(GroupsByName& groups, const std::string& name,
+                     const std::shared_ptr<WatchGroup>& group);
   void DropChanges(WatchGroup& group);
-  void Charge(uint64_t before, uint64_t now);
 
   bool IsLost(const Watch& watch) const;
   void Restart(Watch& watch);
@@ -344,8 +346,7 @@ class ChangeFeed {
   std::map<size_t, size_t> prefix_lengths_;
   GroupsByName by_id_;
   Watch::Set watches_;
-  // Bytes of all pending changes.
-  uint64_t bytes_ = 0;
+  // Covers all pending changes.
   MemoryCharge charge_;
 
   // Input of the thread.
