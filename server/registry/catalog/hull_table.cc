@@ -117,7 +117,6 @@ HullTable::Entry& HullTable::Add(const std::string& id) {
   const auto [place, is_new] = AddEntry(id);
   HULLD_CHECK(is_new || place->second.is_absent_);
   place->second.is_absent_ = false;
-  ++size_;
   return place->second;
 }
 
@@ -151,7 +150,6 @@ void HullTable::Insert(const HullPointer& hull) {
 void HullTable::Erase(const HullPointer& hull) {
   const auto found = index_.find(hull->committed().record.hull_id);
   HULLD_CHECK(found != index_.end() && (*found)->second.awake_ == hull);
-  --size_;
   if (!is_cache()) return EraseEntry(*found);
   Entry& entry = (*found)->second;
   ExchangeCompact(entry, nullptr);
@@ -234,7 +232,6 @@ void HullTable::RestSome(Locked& locked) {
       if (!entry.awake_->IsAtRest() || !RestCompact(locked, entry)) continue;
     }
     if (!is_cache() || entries_.size() <= *most_ || std::exchange(entry.is_used_, false)) continue;
-    if (!entry.is_absent_) --size_;
     EraseEntry(looked_at);
   }
 }

@@ -190,12 +190,9 @@ void RecordReader::TakeRecord(Locked& locked, const std::string& id, const Found
   HULLD_CHECK(!state_.IsKnown(id));
   const auto hull = found.hulls.find(id);
   const auto body = found.bodies.find(id);
-  const bool has_hull = hull != found.hulls.end();
-  const bool has_body = body != found.bodies.end();
-  if (!has_hull && !has_body) return state_.hulls.NoteAbsent(id);
-  if (!has_hull) return state_.AddBody(locked, id, body->second);
-  if (has_body) RegistryState::LogBodyUnderHull(id);
-  state_.AddStored(id, hull->second);
+  if (hull != found.hulls.end()) state_.AddStored(id, hull->second);
+  if (body != found.bodies.end()) state_.AddBody(locked, id, body->second);
+  if (!state_.IsKnown(id)) state_.hulls.NoteAbsent(id);
 }
 
 void RecordReader::OnPeerChange(Locked& /*locked*/, const std::string& id,

@@ -75,14 +75,10 @@ class RegistryState {
 
   // Adds a stored hull, at rest or as damaged. Requires: the hull table has no hull with the ID.
   void AddStored(const std::string& id, const absl::StatusOr<StoredHull>& stored);
-  // Adds a body found in the store at Begin's revision, or logs that a hull has its ID.
-  void AddStoredBody(Locked& locked, const std::string& id,
-                     const absl::StatusOr<StoredBody>& stored);
-  // Replaces the known state of the body with the stored one.
+  // Replaces the known state of the body with the stored one. If a hull has the ID, which the
+  // server never writes, logs that instead: the hull takes precedence, because its vertices could
+  // not be restored.
   void AddBody(Locked& locked, const std::string& id, const absl::StatusOr<StoredBody>& stored);
-  // Logs that the store contains a body with the ID of a hull, which the server never writes. The
-  // hull takes precedence, because its vertices could not be restored.
-  static void LogBodyUnderHull(const std::string& id);
   // Removes a body. Requires: the body table has it.
   void EraseBody(Locked& locked, const std::string& id);
   // Marks a hull as damaged. Idempotent, because several threads may find the same damage.
@@ -91,9 +87,8 @@ class RegistryState {
   // Counts of hulls and bodies. Creations count from submission on, to enforce --max-hulls. These
   // functions take no lock.
   uint64_t HullCount() const {
-    return is_cache_ ? kept_hulls_.load(std::memory_order_relaxed) +
-                           creating_hulls_.load(std::memory_order_relaxed)
-                     : hulls.size();
+    return kept_hulls_.load(std::memory_order_relaxed) +
+           creating_hulls_.load(std::memory_order_relaxed);
   }
   uint64_t BodyCount() const {
     return kept_bodies_.load(std::memory_order_relaxed) +
@@ -103,7 +98,7 @@ class RegistryState {
   absl::Status CheckHullCount() const;
   // Returns the counts, excluding creations in flight.
   RegistrySizes Sizes() const;
-  // Sets the totals of the store at revision(). Requires is_cache().
+  // Sets the totals of the store at revision().
   void SetTotals(const StoreTotals& totals);
 
   // Count a creation at its submission, and at its commit or refusal. A refused hull is forgotten.
@@ -161,10 +156,10 @@ class RegistryState {
   // Prepares the hull before it contains too many points that are no longer vertices.
   void PrepareIfWorn(const HullPointer& hull);
 
+  StoreTotals TotalsOf(const std::string& id);
   std::optional<Incarnation> FindFormer(const std::string& id, const PeerChange& change,
                                         uint64_t since);
-  bool ApplyPeerVersion(Locked& locked, const HullPointer& hull, const PeerChange& change,
-                        bool is_new);
+  bool ApplyPeerVersion(Locked& locked, const HullPointer& hull, const PeerChange& change);
   void EndFormer(Locked& locked, const HullPointer& former, const PeerChange& change);
   void ApplyPeerBody(Locked& locked, const std::string& id, const PeerChange& change);
   void Note(Locked& locked, const std::string& id, const PeerChange& change,
@@ -172,8 +167,8 @@ class RegistryState {
 
   const bool is_cache_;
   uint64_t vertex_count_ = 0;
-  // Numbers of hulls and bodies in the store at revision_ (hulls: only if the table is a cache),
-  // and of uncommitted creations. Changed under the mutex.
+  // Numbers of hulls and bodies in the store at revision(), and of uncommitted creations. Changed
+  // under the mutex.
   std::atomic<uint64_t> kept_hulls_ = 0;
   std::atomic<uint64_t> creating_hulls_ = 0;
   std::atomic<uint64_t> kept_bodies_ = 0;
