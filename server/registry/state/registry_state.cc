@@ -266,12 +266,10 @@ std::optional<Incarnation> RegistryState::FindFormer(const std::string& id,
     if (hull == nullptr) return std::nullopt;
     return Incarnation::Of(hull->committed().record);
   }
-  std::optional<Incarnation> former;
-  if (change.former_began != 0) {
-    former = {change.former_began, change.former_was_body};
-  } else if (change.hull.has_value() && change.hull->ok()) {
+  std::optional<Incarnation> former = change.former;
+  if (!former.has_value() && change.hull.has_value() && change.hull->ok()) {
     former = Incarnation::Of((*change.hull)->record);
-  } else if (change.body.has_value() && change.body->ok()) {
+  } else if (!former.has_value() && change.body.has_value() && change.body->ok()) {
     former = Incarnation::Of((*change.body)->record);
   }
   return former.has_value() && former->create_revision <= since ? former : std::nullopt;

@@ -162,17 +162,6 @@ class Watch {
   bool is_nudged_ = false;
 };
 
-// A hull or body from its creation or replacement to its end.
-struct Incarnation {
-  static Incarnation Of(const HullRecord& record) { return {record.create_revision, false}; }
-  static Incarnation Of(const BodyRecord& record) { return {record.create_revision, true}; }
-
-  uint64_t create_revision = 0;
-  bool is_body = false;
-
-  bool operator==(const Incarnation&) const = default;
-};
-
 // The most recent deletions of hulls and bodies, in the order of their revisions, for watches that
 // resume: a deletion leaves no trace in the store. Not thread-safe.
 class DeletionLog {

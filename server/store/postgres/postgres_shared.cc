@@ -96,15 +96,14 @@ Statement FetchStatement(uint64_t batch) {
           .parameters = {EncodeBigint(batch), EncodeBigint(kMaxFollowed + 1)}};
 }
 
-// Records the first incarnation that ended. rows: the result of hulld_follow.
-void NoteFormer(const Rows& rows, int row, PeerChange& change) {
+// Returns the first incarnation that ended, if any. rows: the result of hulld_follow.
+std::optional<Incarnation> FormerIn(const Rows& rows, int row) {
   const auto began = [&](int column) {
     return rows.at(row, column).empty() ? UINT64_MAX : rows.bigint(row, column);
   };
   const uint64_t first = std::min(began(13), began(14));
-  if (first == UINT64_MAX) return;
-  change.former_began = first;
-  change.former_was_body = first == began(14);
+  if (first == UINT64_MAX) return std::nullopt;
+  return Incarnation{first, first == began(14)};
 }
 
 absl::Status Moved() { return absl::AbortedError("a peer server changed the hull"); }
@@ -190,7 +189,7 @@ absl::Status PostgresStore::NotePeerChanges(const Rows& rows) {
     PeerChange& change = peer_changes_.by_id[id];
     change.revision = rows.bigint(i, 6);
     change.ended_at = std::max(change.ended_at, rows.bigint(i, 7));
-    if (change.former_began == 0) NoteFormer(rows, i, change);
+    if (!change.former.has_value()) change.former = FormerIn(rows, i);
     change.hull.reset();
     change.body.reset();
     if (!rows.at(i, 8).empty()) {
