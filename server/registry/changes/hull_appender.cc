@@ -414,7 +414,7 @@ void LocalChanges::SubmitChunk(Locked& locked, const HullPointer& hull, PendingC
   // If a peer server may commit first, keeps the chunk for a retry.
   std::shared_ptr<PendingChunk> kept;
   const Reply<ChunkResult> done = pending.done;
-  const WriterSequence writer = *built.change.writer;
+  const uint64_t sequence = built.change.writer->sequence;
   if (peers_.has_peers()) {
     kept = std::make_shared<PendingChunk>(std::move(pending));
     // NOLINTNEXTLINE(bugprone-use-after-move): it is the caller's again
@@ -427,13 +427,11 @@ void LocalChanges::SubmitChunk(Locked& locked, const HullPointer& hull, PendingC
       hull->Requeue(std::move(*kept));
       return;
     }
-    if (!status.ok()) {
-      return AnswerChunk(later, done, writer.sequence, status);
-    }
-    state_.ApplyChunk(later, hull, {change.hull, mark, writer, counts.outside});
+    if (!status.ok()) return AnswerChunk(later, done, sequence, status);
+    state_.ApplyChunk(later, hull, change, mark, counts.outside);
     const HullRecord& record = change.hull.record;
     AnswerChunk(
-        later, done, writer.sequence,
+        later, done, sequence,
         ChunkResult{state_.revision(), false, record.revision, record.vertex_count, counts});
   };
   hull->state.Submit();

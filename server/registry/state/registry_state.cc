@@ -193,11 +193,11 @@ void RegistryState::ApplyDeletion(Locked& locked, const HullPointer& hull, uint6
   Forget(locked, hull, Gone(record.hull_id, "deleted"));
 }
 
-void RegistryState::ApplyChunk(Locked& locked, const HullPointer& hull,
-                               const CommittedChunk& chunk) {
+void RegistryState::ApplyChunk(Locked& locked, const HullPointer& hull, const Change& chunk,
+                               const LiveHull::Mark& mark, uint64_t points) {
   const HullRecord before = hull->committed().record;
   const HullRecord& after = chunk.hull.record;
-  hull->Commit(locked, chunk.hull, chunk.mark, chunk.writer, chunk.vertices);
+  hull->Commit(locked, chunk, mark, points);
   NoteChange(*hull);
   if (after.revision != before.revision) {
     NoteVertices(before.vertex_count, after.vertex_count);

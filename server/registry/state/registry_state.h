@@ -41,16 +41,6 @@ namespace hulld::server {
 // - At most one thread prepares a hull, or is about to (RegisteredHull::is_preparing).
 class RegistryState {
  public:
-  // A committed chunk of a hull.
-  struct CommittedChunk {
-    // The hull with the chunk, and the prefix of its LiveHull.
-    const StoredHull& hull;
-    const LiveHull::Mark& mark;
-    const WriterSequence& writer;
-    // Number of points of the chunk that became vertices.
-    uint64_t vertices = 0;
-  };
-
   // preparers: metrics of the queue of hulls to prepare.
   RegistryState(Store& store, const Limits& limits, std::optional<PoolMetrics> preparers);
   RegistryState(const RegistryState&) = delete;
@@ -113,7 +103,9 @@ class RegistryState {
   void ApplyCreation(Locked& locked, const HullPointer& former, const HullPointer& hull,
                      const StoredHull& stored);
   void ApplyDeletion(Locked& locked, const HullPointer& hull, uint64_t revision);
-  void ApplyChunk(Locked& locked, const HullPointer& hull, const CommittedChunk& chunk);
+  // mark, points: as for RegisteredHull::Commit.
+  void ApplyChunk(Locked& locked, const HullPointer& hull, const Change& chunk,
+                  const LiveHull::Mark& mark, uint64_t points);
   // body: null after a deletion. Requires an entry for the ID.
   void ApplyBody(Locked& locked, const std::string& id, const std::shared_ptr<const Body>& body,
                  uint64_t revision);
