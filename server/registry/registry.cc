@@ -60,7 +60,10 @@ absl::Status Registry::Load() {
     totals.bodies = state_.bodies.size();
   }
   state_.SetTotals(totals);
-  return peers_.Begin(locked, {&changes_, &records_});
+  return peers_.Begin(locked, [this](const std::string& id, const HullPointer& hull) {
+    if (hull != nullptr) changes_.DeferAdvance(hull);
+    records_.OnPeerChange(id);
+  });
 }
 
 absl::StatusOr<Resolved> Registry::Resolve(std::span<const std::string> ids,

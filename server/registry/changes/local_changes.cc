@@ -277,9 +277,7 @@ void LocalChanges::Submit(Locked& locked, const HullPointer& hull, Change change
                       status.ok() ? hull->state.Commit() : hull->state.Refuse();
                       finish(later, status, committed);
                       // The peer change must be applied first.
-                      if (Committer::IsSuperseded(status)) {
-                        return peers_.Defer([this, hull](Locked& next) { Advance(next, hull); });
-                      }
+                      if (Committer::IsSuperseded(status)) return DeferAdvance(hull);
                       // A hull at rest may be evicted.
                       if (hull->state.quiet() && !hull->state.gone()) {
                         hull->DiscardUnneededBuilder(later);
@@ -320,9 +318,8 @@ void LocalChanges::Advance(Locked& locked, const HullPointer& hull, bool is_last
   });
 }
 
-void LocalChanges::OnPeerChange(Locked& /*locked*/, const std::string& /*id*/,
-                                const HullPointer& hull) {
-  if (hull != nullptr) peers_.Defer([this, hull](Locked& later) { Advance(later, hull); });
+void LocalChanges::DeferAdvance(const HullPointer& hull) {
+  peers_.Defer([this, hull](Locked& later) { Advance(later, hull); });
 }
 
 }  // namespace hulld::server

@@ -51,7 +51,7 @@ struct PendingChunk;
 //     unchanged.
 //
 // Guarded by the registry's mutex; functions without a Locked parameter acquire it.
-class LocalChanges : public PeerChangeListener {
+class LocalChanges {
  public:
   // All must outlive this. Chunks are built on `writers`.
   LocalChanges(RegistryState& state, Committer& committer, PeerSync& peers, RecordReader& records,
@@ -103,8 +103,8 @@ class LocalChanges : public PeerChangeListener {
   void Append(const AppendSession& session, Chunk chunk, std::function<bool()> should_stop,
               std::function<void()> on_built, Reply<ChunkResult> done);
 
-  // Resumes the tasks that wait for the hull.
-  void OnPeerChange(Locked& locked, const std::string& id, const HullPointer& hull) override;
+  // Defers the tasks that wait for the hull, which a peer server changed. Requires the mutex.
+  void DeferAdvance(const HullPointer& hull);
 
  private:
   using Creation = std::function<void(Locked&, absl::StatusOr<HullPointer>)>;

@@ -32,9 +32,9 @@ PeerSync::PeerSync(RegistryState& state, Committer& committer)
 }
 
 // The pages of the initial load span more than one revision.
-absl::Status PeerSync::Begin(Locked& locked, std::vector<PeerChangeListener*> listeners) {
+absl::Status PeerSync::Begin(Locked& locked, OnChange on_change) {
   if (!has_peers()) return absl::OkStatus();
-  listeners_ = std::move(listeners);
+  on_change_ = std::move(on_change);
   const SteadyClock::time_point asked = SteadyClock::now();
   absl::Status fetched = feed_->Fetch();
   Apply(locked, feed_->TakeChanges());
@@ -148,8 +148,7 @@ void PeerSync::Apply(Locked& locked, const PeerChanges& changes) {
   std::ranges::sort(in_order);
   const uint64_t since = state_.revision();
   for (const auto& [revision, id] : in_order) {
-    const auto hull = state_.ApplyPeerChange(locked, *id, changes.by_id.at(*id), since);
-    for (PeerChangeListener* const each : listeners_) each->OnPeerChange(locked, *id, hull);
+    on_change_(*id, state_.ApplyPeerChange(locked, *id, changes.by_id.at(*id), since));
     state_.hulls.RestSome(locked);
     state_.bodies.DropSome(locked);
   }

@@ -195,8 +195,7 @@ void RecordReader::TakeRecord(Locked& locked, const std::string& id, const Found
   if (!state_.IsKnown(id)) state_.hulls.NoteAbsent(id);
 }
 
-void RecordReader::OnPeerChange(Locked& /*locked*/, const std::string& id,
-                                const HullPointer& /*hull*/) {
+void RecordReader::OnPeerChange(const std::string& id) {
   const auto found = readings_.find(id);
   if (found == readings_.end()) return;
   if (!state_.IsKnown(id)) state_.hulls.NoteAbsent(id);

@@ -46,7 +46,7 @@ inline constexpr ClientId kWatchReader = {2};
 //     be answered from the earlier one next.
 //
 // Guarded by the registry's mutex, which is released during store queries.
-class RecordReader : public PeerChangeListener, public PageSource {
+class RecordReader final : public PageSource {
  public:
   // All must outlive this. loaders: threads for reads without a blocked caller, and for watches.
   RecordReader(RegistryState& state, Committer& committer, PeerSync& peers, TaskPool& loaders)
@@ -75,8 +75,9 @@ class RecordReader : public PeerChangeListener, public PageSource {
   FoundBodies FindBodies(std::span<const std::string> ids,
                          const std::function<bool()>& should_stop = {}, bool may_wait = true);
 
-  // Ends the read of the ID; its tasks look the ID up again.
-  void OnPeerChange(Locked& locked, const std::string& id, const HullPointer& hull) override;
+  // Ends the read of the ID, which a peer server changed; its tasks look the ID up again. Requires
+  // the mutex.
+  void OnPeerChange(const std::string& id);
 
   // Returns at most `page_size` hulls, or bodies, or both, with IDs that start with `prefix` and
   // follow `after` in byte order; a page of bodies may contain fewer even if more follow. If the
