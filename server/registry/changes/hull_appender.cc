@@ -112,11 +112,9 @@ void LocalChanges::OpenNew(Locked& locked, const std::shared_ptr<OpenRequest>& r
   if (!request->create_if_absent) {
     return Answer(locked, request->done, state_.NoSuchHull(request->hull_id));
   }
-  CreateNew(locked, request->hull_id,
-            [=, this](Locked& later, const absl::StatusOr<HullPointer>& created) {
-              if (Committer::IsSuperseded(created.status())) return later.AfterwardsLocked(again);
-              if (!created.ok()) return Answer(later, request->done, created.status());
-              OpenSession(later, *created, *request, true, 0);
+  CreateNew(locked, request->hull_id, request->done, again,
+            [=, this](Locked& later, const HullPointer& created) {
+              OpenSession(later, created, *request, true, 0);
             });
 }
 

@@ -107,14 +107,15 @@ class LocalChanges {
   void DeferAdvance(const HullPointer& hull);
 
  private:
-  using Creation = std::function<void(Locked&, absl::StatusOr<HullPointer>)>;
+  using Creation = std::function<void(Locked&, const HullPointer&)>;
   struct OpenRequest;
   struct BuiltChunk;
 
   void Submit(Locked& locked, const HullPointer& hull, Change change, Committer::Completion finish);
   void Advance(Locked& locked, const HullPointer& hull, bool is_last = false);
 
-  void CreateNew(Locked& locked, const std::string& id, const Creation& done);
+  void CreateNew(Locked& locked, const std::string& id, const Refusal& refuse,
+                 const LockedTask& again, const Creation& done);
   absl::Status CheckPutBody(Locked& locked, const std::string& id,
                             std::optional<uint64_t> if_revision);
   void SubmitBody(Locked& locked, Change change, Committer::Completion finish);
