@@ -365,7 +365,6 @@ absl::StatusOr<Rows> PostgresStore::Claim(Statement claim) {
   if (rows->count() != 1) return absl::DataLossError("the row of hulld.store is missing");
   epoch_ = rows->bigint(0, 0);
   batch_ = rows->bigint(0, 1);
-  seen_batch_ = batch_;
   revision_ = rows->bigint(0, 2);
   id_ = std::string(rows->at(0, 3));
   totals_ = {rows->bigint(0, 4), rows->bigint(0, 5), rows->bigint(0, 6)};

@@ -201,7 +201,6 @@ absl::Status PostgresStore::NotePeerChanges(const Rows& rows) {
     }
   }
   batch_ = rows.bigint(0, 0);
-  seen_batch_ = batch_;
   revision_ = rows.bigint(0, 1);
   totals_ = {rows.bigint(0, 11), rows.bigint(0, 12), rows.bigint(0, 15)};
   if (peer_changes_.by_id.empty()) return absl::OkStatus();
@@ -309,7 +308,7 @@ absl::Status PostgresStore::EndStuckTransactions() {
 
 void PostgresStore::StartNotices() {
   const auto on_batch = [this](uint64_t batch) {
-    if (batch > seen_batch_) NotifyPeerCommit();
+    if (batch > batch_) NotifyPeerCommit();
   };
   notices_ = std::make_unique<BatchNotices>(
       [this] { return OpenListener(); }, options_.heartbeat, on_batch,
@@ -327,7 +326,7 @@ bool PostgresStore::HearsPeers() const {
 absl::Status PostgresStore::PollPeers() {
   HULLD_ASSIGN_OR_RETURN(const uint64_t batch, LastBatch(*keeper_session_));
   looked_at_ = batch;
-  if (batch != seen_batch_) NotifyPeerCommit();
+  if (batch != batch_) NotifyPeerCommit();
   return absl::OkStatus();
 }
 

@@ -130,7 +130,6 @@ bool PostgresStore::EndsWithin(std::chrono::milliseconds pause) {
 // Records a committed batch.
 void PostgresStore::Keep(const Batch& batch) {
   batch_ = batch.number;
-  seen_batch_ = batch_;
   revision_ = batch.revision;
   totals_ = {totals_.hulls + batch.added.hulls, totals_.vertices + batch.added.vertices,
              totals_.bodies + batch.added.bodies};

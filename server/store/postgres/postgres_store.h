@@ -249,11 +249,9 @@ class PostgresStore : public Store, public PeerFeed {
 
   // For Commit, Recover, and shutdown, which never overlap.
   std::unique_ptr<Session> writer_;
-  // Number of committed batches, as far as is known.
-  uint64_t batch_ = 0;
-  // Shared: batch_ for the keeper, and the changes of peer servers up to it that TakeChanges has
-  // not returned yet.
-  std::atomic<uint64_t> seen_batch_ = 0;
+  // Number of committed batches, as far as is known. Read by the keeper and the notices, too.
+  std::atomic<uint64_t> batch_ = 0;
+  // Shared: the changes of peer servers up to that batch that TakeChanges has not returned yet.
   PeerChanges peer_changes_;
   // Shared: a started query for Fetch to finish; null: it must send one.
   std::unique_ptr<Session> fetching_;
