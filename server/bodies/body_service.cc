@@ -160,8 +160,8 @@ class BodyService : public BodyServiceOfBytes {
                    std::chrono::nanoseconds staleness, v1::GetBodyResponse* response) {
     const std::string& id = request.body_id();
     HULLD_RETURN_IF_ERROR(CheckHullId(call.caller(), id, "body_id"));
-    const FoundBodies found = parts_.registry.records().FindBodies(
-        std::span(&id, 1), [&call] { return call.ShouldStop(); });
+    const FoundBodies found =
+        parts_.registry.records().FindBodies(std::span(&id, 1), call.should_stop());
     if (!found.status.ok()) return found.status;
     const std::shared_ptr<const Body>& body = found.bodies.front();
     if (body == nullptr) return BodyNotFound(id);

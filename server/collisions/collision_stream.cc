@@ -132,7 +132,7 @@ class CollisionStream
     // No thread waits for a store query, because an unresponsive store would block all threads.
     TaskPool& threads = messages_ == 0 ? parts_.long_readers : parts_.readers;
     const bool awaits = parts_.waiting.AwaitFresh(
-        parts_.registry, refresh_->freshness, [this] { return call().ShouldStop(); },
+        parts_.registry, refresh_->freshness, call().should_stop(),
         [this, &threads, self = shared_from_this()](const absl::Status& fresh) {
           RunOn(threads, [this, fresh] { AnswerMessage(OfMessage(fresh)); });
         });

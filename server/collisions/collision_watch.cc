@@ -163,11 +163,11 @@ class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchC
     const auto on_ready = [this, self = shared_from_this()] {
       Locked([this] { has_changes_ = true; });
     };
-    const auto should_stop = [this] { return call().ShouldStop(); };
     HULLD_ASSIGN_OR_RETURN(
         WatchedHulls::Round round,
         hulls_.Open(table_.hull_ids(), on_ready,
-                    table_.LookupFor(options_, {kExpectedRounds * per_hull, true}), should_stop));
+                    table_.LookupFor(options_, {kExpectedRounds * per_hull, true}),
+                    call().should_stop()));
     Locked([this] { has_changes_ = true; });
     table_.SetHulls(parts_.store, std::move(round.resolved), options_);
     revision_ = round.revision;
@@ -199,8 +199,7 @@ class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchC
   }
 
   void TakeChanges() {
-    absl::StatusOr<WatchedHulls::Round> round =
-        hulls_.TakeChanges([this] { return call().ShouldStop(); });
+    absl::StatusOr<WatchedHulls::Round> round = hulls_.TakeChanges(call().should_stop());
     if (!round.ok()) return EndWork(round.status());
     if (round->waits) return EndWork(absl::OkStatus());
     // More changes may be pending.

@@ -225,11 +225,10 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   // Returns true if the call waits for the store without occupying a thread. It is then opened
   // after the store answers.
   bool AwaitsFresh() {
-    const auto should_stop = [this] { return this->call().ShouldStop(); };
     const auto open = [this, self = this->shared_from_this()](const absl::Status& status) {
       this->RunOn(parts_.long_readers, [this, status] { OpenWith(status, true); });
     };
-    return parts_.waiting.AwaitFresh(registry(), freshness_, should_stop, open);
+    return parts_.waiting.AwaitFresh(registry(), freshness_, this->call().should_stop(), open);
   }
 
   void OpenWith(absl::Status status, bool may_wait) {

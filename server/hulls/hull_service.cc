@@ -119,7 +119,7 @@ class HullService : public HullServiceOfBytes {
     HULLD_RETURN_IF_ERROR(CheckHullId(call.caller(), request.hull_id(), "hull_id"));
     HULLD_ASSIGN_OR_RETURN(const Freshness freshness,
                            DecodeFreshness(request.freshness(), parts_.store, call.arrival()));
-    const auto should_stop = [&call] { return call.ShouldStop(); };
+    const auto should_stop = call.should_stop();
     HULLD_ASSIGN_OR_RETURN(const auto resolved,
                            parts_.registry.Resolve(request.hull_id(), should_stop, freshness));
     const auto& [as_of, view] = resolved;

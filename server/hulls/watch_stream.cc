@@ -97,8 +97,7 @@ class WatchStream : public RequestStream<PulledStream<WriteReactor, v1::WatchHul
       return absl::InvalidArgumentError(
           "after_revision requires store_id; use the one from the same header");
     }
-    HULLD_RETURN_IF_ERROR(
-        parts_.registry.peers().AwaitPeers([this] { return call().ShouldStop(); }));
+    HULLD_RETURN_IF_ERROR(parts_.registry.peers().AwaitPeers(call().should_stop()));
     HULLD_ASSIGN_OR_RETURN(watch_, parts_.registry.feed().Open(
                                        target, {request().after_revision(), request().store_id()},
                                        [this, self = shared_from_this()] { SendNext(); }));
@@ -145,9 +144,8 @@ class WatchStream : public RequestStream<PulledStream<WriteReactor, v1::WatchHul
     loaded.reserve(batch->changes.size());
     for (HullChange& change : batch->changes) {
       if (WantsBox(change)) {
-        const auto resolved = parts_.registry.Resolve(
-            change.record.hull_id, [this] { return call().ShouldStop(); },
-            Freshness::AnyStaleness());
+        const auto resolved = parts_.registry.Resolve(change.record.hull_id, call().should_stop(),
+                                                      Freshness::AnyStaleness());
         const absl::Status& status = resolved.status();
         if (absl::IsNotFound(status)) continue;
         if (!status.ok() && !absl::IsDataLoss(status)) return status;

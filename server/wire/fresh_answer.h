@@ -39,7 +39,7 @@ void EndFresh(Registry& registry, TaskPool& pool, UnaryCall* call, Answer answer
   }
   call->EndOn(pool, [&registry, call, freshness = *freshness, answer = std::move(answer)] {
     const absl::StatusOr<std::chrono::nanoseconds> staleness =
-        registry.peers().AwaitFresh(freshness, [call] { return call->call().ShouldStop(); });
+        registry.peers().AwaitFresh(freshness, call->call().should_stop());
     return staleness.ok() ? answer(*staleness) : staleness.status();
   });
 }
@@ -59,8 +59,7 @@ void EndListed(Registry& registry, TaskPool& pool, UnaryCall* call, Rpc rpc, Rec
     const uint32_t asked =
         request.page_size() == 0 ? Config::kDefaultPageSize : request.page_size();
     const absl::StatusOr<RecordPage> page = registry.records().List(
-        prefix, after, std::min(asked, Config::kMaxPageSize),
-        [call] { return call->call().ShouldStop(); }, kinds);
+        prefix, after, std::min(asked, Config::kMaxPageSize), call->call().should_stop(), kinds);
     if (!page.ok()) return page.status();
     EncodeHeader(registry.store(), AsOf{page->store_revision, staleness},
                  call->response().mutable_header());
