@@ -15,12 +15,6 @@
 namespace hulld::server {
 namespace {
 
-void EncodeBox(const ServedHull& hull, v1::GetHullResponse* response) {
-  if (hull.empty()) return;
-  EncodeVector(hull.low(), response->mutable_box_min());
-  EncodeVector(hull.high(), response->mutable_box_max());
-}
-
 void AddListed(const HullChange& hull, v1::ListHullsResponse& response) {
   v1::HullInfo* info = response.add_hulls();
   EncodeRecord(hull.record, info);
@@ -125,7 +119,7 @@ class HullService : public HullServiceOfBytes {
     const auto& [as_of, view] = resolved;
     EncodeHeader(parts_.store, as_of, response->mutable_header());
     EncodeRecord(view.record, response->mutable_hull());
-    EncodeBox(*view.served, response);
+    EncodeBox(view.served->box(), response);
     const bool wants_properties = request.properties() && !view.served->empty();
     if (request.without_facets() && !request.audit() && !wants_properties) return absl::OkStatus();
     HULLD_ASSIGN_OR_RETURN(const Hull* hull, parts_.registry.reader().Canonical(view, should_stop));

@@ -50,9 +50,7 @@ void EncodeEvent(const HullChange& change, v1::HullEvent* event) {
     EncodeRecord(change.record, event->mutable_hull());
   }
   event->mutable_hull()->set_damaged(change.damaged);
-  if (change.box.IsEmpty()) return;
-  EncodeVector(change.box.low, event->mutable_box_min());
-  EncodeVector(change.box.high, event->mutable_box_max());
+  EncodeBox(change.box, event);
 }
 
 // A WatchHulls call. Sends one batch of changes after another. If no change is pending, the feed
