@@ -21,10 +21,10 @@ absl::Status Missing(const char* message) {
 }
 
 // Logs each new error of a file, and its recovery, once.
-void Complain(const char* what, const absl::Status& status, std::string* complaint) {
+void LogNewError(const char* what, const absl::Status& status, std::string* last_error) {
   const std::string message(status.message());
-  if (message == *complaint) return;
-  *complaint = message;
+  if (message == *last_error) return;
+  *last_error = message;
   if (status.ok()) {
     spdlog::info("{} are readable again", what);
   } else {
@@ -99,8 +99,8 @@ absl::Status Guard::LoadAll() {
 
 void Guard::Reload() {
   const std::lock_guard lock(mutex_);
-  if (config_.has_tls()) Complain("the TLS certificates", ReloadTls(), &tls_complaint_);
-  if (!config_.tokens_file.empty()) Complain("the tokens", ReloadTokens(), &tokens_complaint_);
+  if (config_.has_tls()) LogNewError("the TLS certificates", ReloadTls(), &tls_error_);
+  if (!config_.tokens_file.empty()) LogNewError("the tokens", ReloadTokens(), &tokens_error_);
 }
 
 void Guard::OnTokensChanged(std::function<void()> changed) {

@@ -74,8 +74,8 @@ class Guard {
   std::mutex mutex_;
   // The current TLS identity, and the last logged error of each kind of file.
   TlsIdentity identity_;
-  std::string tls_complaint_;
-  std::string tokens_complaint_;
+  std::string tls_error_;
+  std::string tokens_error_;
 
   std::function<void()> tokens_changed_;
 

@@ -67,7 +67,7 @@ BatchStream::BatchStream(CallContext& context, const ServiceParts& parts, const 
                      .max_units = kMaxPairs,
                      .max_short_placements = kMaxPlacementsPerSlice,
                      .joins_head = true,
-                     .steps_per_look = kPairsPerPoll}) {}
+                     .steps_per_poll = kPairsPerPoll}) {}
 
 absl::Status BatchStream::Validate() {
   HULLD_RETURN_IF_ERROR(DecodePlacements(request().method(), "the batch"));
@@ -95,7 +95,7 @@ absl::Status BatchStream::Step(PairsPiece& piece, Clock::time_point end) {
     EndPair(piece, AddUnansweredPair(table_, wanted, columns));
     return absl::OkStatus();
   }
-  if (AsksRelationsOfHulls(query_, table_)) return AnswerRelation(a, b, piece);
+  if (WantsRelationsOfHulls(query_, table_)) return AnswerRelation(a, b, piece);
   if (!piece.search.has_value()) {
     piece.search.emplace(table_, a, b, query_, motion_options_);
     HULLD_RETURN_IF_ERROR(piece.search->CheckMemory(registry()));

@@ -125,7 +125,7 @@ class CollisionStream
   void Handle() {
     pairs_.EndRound();
     decided_.clear();
-    next_asked_ = 0;
+    next_pair_ = 0;
     refresh_.reset();
     const absl::Status status = HandleMessage();
     if (!status.ok() || !refresh_.has_value()) return AnswerMessage(status);
@@ -234,7 +234,7 @@ class CollisionStream
     LivePair& pair = pairs_.pair(index);
     const bool answerable = table_.is_answerable(pair.a) && table_.is_answerable(pair.b);
     PlacedAnswer answer;
-    if (answerable) answer = AskAtRest(table_, pair.a, pair.b, options_, &pair.cache);
+    if (answerable) answer = QueryAtRest(table_, pair.a, pair.b, options_, &pair.cache);
     const bool is_answered = answerable && answer.answer.ok();
     if (is_answered) rungs_.Add(answer.answer->rung);
     const v1::Relation relation =
@@ -326,15 +326,15 @@ class CollisionStream
       if (next_row_ < table_.table_rows()) return SendPart(false);
       reply_bytes_ = reply().ByteSizeLong();
     }
-    const bool is_plain = AsksRelationsOfHulls(options_, table_);
-    const std::span<const uint32_t> asked = pairs_.selected();
-    if (is_plain && decided_.size() < asked.size()) return DecideTogether();
+    const bool is_plain = WantsRelationsOfHulls(options_, table_);
+    const std::span<const uint32_t> selected = pairs_.selected();
+    if (is_plain && decided_.size() < selected.size()) return DecideTogether();
     const auto end = std::chrono::steady_clock::now() + TaskPool::kSliceTime;
-    const size_t pairs_per_look =
+    const size_t pairs_per_poll =
         is_plain ? kPairsPerClockRead : (table_.has_bodies() ? 1 : kPairsPerClaim);
-    while (next_asked_ < asked.size() && reply_bytes_ < FullMessageBytes(wanted_)) {
-      is_plain ? AddDecided(next_asked_) : AddAnswer(asked[next_asked_]);
-      if (++next_asked_ % pairs_per_look != 0) continue;
+    while (next_pair_ < selected.size() && reply_bytes_ < FullMessageBytes(wanted_)) {
+      is_plain ? AddDecided(next_pair_) : AddAnswer(selected[next_pair_]);
+      if (++next_pair_ % pairs_per_poll != 0) continue;
       if (call().ShouldStop()) break;
       if (std::chrono::steady_clock::now() >= end) {
         return RunOn(lane_, [this] { AnswerSlice(); });
@@ -342,7 +342,7 @@ class CollisionStream
     }
     call().metrics().CountPairs(std::exchange(rungs_, {}));
     if (call().ShouldStop()) return FinishCall(call().StopStatus());
-    const bool is_last = next_asked_ == pairs_.selected().size();
+    const bool is_last = next_pair_ == pairs_.selected().size();
     if (is_last) call().EndMessage();
     SendPart(is_last);
   }
@@ -377,7 +377,7 @@ class CollisionStream
   // The current message queries the selected pairs, in ascending order.
   LivePairs pairs_;
   // Index of the next selected pair to answer.
-  size_t next_asked_ = 0;
+  size_t next_pair_ = 0;
   RungCounts rungs_;
 
   // Results of a plain answer, decided by several threads; then parallel to the selected pairs.

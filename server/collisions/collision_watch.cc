@@ -311,7 +311,7 @@ class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchC
       pair.is_within_clearance = false;
       return absl::OkStatus();
     }
-    const PlacedAnswer found = AskAtRest(table_, pair.a, pair.b, options_, &pair.cache);
+    const PlacedAnswer found = QueryAtRest(table_, pair.a, pair.b, options_, &pair.cache);
     const absl::StatusOr<Answer>& answer = found.answer;
     if (!answer.ok()) return answer.status();
     rungs_.Add(answer->rung);

@@ -103,13 +103,13 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     // True if the first answers may join the last message of the head.
     bool joins_head;
     // Steps between two reads of the clock, for pairs of hulls at rest.
-    uint64_t steps_per_look;
+    uint64_t steps_per_poll;
   };
 
   PiecedReplies(const Bytes& request, CallContext& context, Rpc rpc, const ServiceParts& parts,
                 const Shape& shape)
       : Base(request, context, parts.admission, rpc),
-        steps_per_look_(shape.steps_per_look),
+        steps_per_poll_(shape.steps_per_poll),
         parts_(parts),
         lane_(parts.pool),
         max_pieces_(2 * parts.pool.threads()),
@@ -206,7 +206,7 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   // Minimum number of pairs that the call queries.
   uint64_t expected_pairs_ = 0;
   // Steps between two reads of the clock. Written while no slice runs.
-  uint64_t steps_per_look_;
+  uint64_t steps_per_poll_;
 
  private:
   // Returns true if preparation takes at most about a slice, excluding waits.
@@ -251,7 +251,7 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
       opening_ = false;
       if (!status.ok()) return this->End(status);
       const bool is_slow = table_.has_bodies() || table_.has_motions() || IsTextbook();
-      if (is_slow) steps_per_look_ = 1;
+      if (is_slow) steps_per_poll_ = 1;
       unit_count_ = CountUnits();
     });
   }
@@ -275,7 +275,7 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   // Works on the piece until `end`, or until it is done.
   absl::Status Advance(Work& piece, Clock::time_point end) {
     do {
-      for (uint64_t left = steps_per_look_; left > 0 && !piece.is_done(); --left) {
+      for (uint64_t left = steps_per_poll_; left > 0 && !piece.is_done(); --left) {
         HULLD_RETURN_IF_ERROR(Step(piece, end));
       }
     } while (!piece.is_done() && Clock::now() < end);

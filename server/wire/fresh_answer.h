@@ -56,10 +56,11 @@ void EndListed(Registry& registry, TaskPool& pool, UnaryCall* call, Rpc rpc, Rec
                            PrefixToList(call->call().caller(), request.prefix()));
     HULLD_ASSIGN_OR_RETURN(const std::string after,
                            DecodePageToken(rpc, request.page_token(), prefix));
-    const uint32_t asked =
+    const uint32_t page_size =
         request.page_size() == 0 ? Config::kDefaultPageSize : request.page_size();
-    const absl::StatusOr<RecordPage> page = registry.records().List(
-        prefix, after, std::min(asked, Config::kMaxPageSize), call->call().should_stop(), kinds);
+    const absl::StatusOr<RecordPage> page =
+        registry.records().List(prefix, after, std::min(page_size, Config::kMaxPageSize),
+                                call->call().should_stop(), kinds);
     if (!page.ok()) return page.status();
     EncodeHeader(registry.store(), AsOf{page->store_revision, staleness},
                  call->response().mutable_header());

@@ -67,7 +67,7 @@ bool HullTable::contains(const std::string& id) const {
   return found != index_.end() && !(*found)->second.is_absent_;
 }
 
-std::optional<HullPointer> HullTable::Ask(const std::string& id) {
+std::optional<HullPointer> HullTable::LookUp(const std::string& id) {
   const auto found = index_.find(id);
   if (found == index_.end()) return is_cache() ? std::nullopt : std::optional<HullPointer>(nullptr);
   Entry& entry = (*found)->second;
@@ -226,13 +226,13 @@ void HullTable::RestSome(Locked& locked) {
       return;
     }
     if (i + 1 == kHullsPerStep) hand_ = next->first;
-    const auto looked_at = next++;
-    Entry& entry = looked_at->second;
+    const auto visited = next++;
+    Entry& entry = visited->second;
     if (entry.awake_ != nullptr) {
       if (!entry.awake_->IsAtRest() || !RestCompact(locked, entry)) continue;
     }
     if (!is_cache() || entries_.size() <= *most_ || std::exchange(entry.is_used_, false)) continue;
-    EraseEntry(looked_at);
+    EraseEntry(visited);
   }
 }
 

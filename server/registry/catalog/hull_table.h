@@ -129,11 +129,11 @@ class HullTable {
 
   // Returns the hull and wakes it if it is at rest; null if it is absent; nullopt if it is unknown.
   // Cost: O(1), plus restoring the points of a small hull.
-  std::optional<HullPointer> Ask(const std::string& id);
-  // Prefetches the index entry of an ID that Ask or Find will look up.
+  std::optional<HullPointer> LookUp(const std::string& id);
+  // Prefetches the index entry of an ID that LookUp or Find will look up.
   void Prefetch(const std::string& id) const { index_.prefetch(id); }
-  // Like Ask, but returns null for an unknown ID.
-  HullPointer Find(const std::string& id) { return Ask(id).value_or(nullptr); }
+  // Like LookUp, but returns null for an unknown ID.
+  HullPointer Find(const std::string& id) { return LookUp(id).value_or(nullptr); }
   // Adds a stored hull, at rest. Requires: no hull has its ID.
   void AddResting(const StoredHull& stored);
   // Records that the ID is absent. Requires: the ID is unknown.

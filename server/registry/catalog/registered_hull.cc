@@ -235,14 +235,14 @@ std::shared_ptr<const ServedHull> RegisteredHull::Serve() {
     served_.version =
         std::make_shared<const ServedHull>(live()->VersionAt(mark), BoxAt(mark), served_.canonical);
   }
-  std::shared_ptr<const Reading> reading = served_.readers.lock();
+  std::shared_ptr<const PinnedVersion> pinned = served_.readers.lock();
   if (is_new) CountParts();
-  if (reading == nullptr) {
-    reading = std::make_shared<const Reading>(account.parts(), served_.version);
-    served_.readers = reading;
+  if (pinned == nullptr) {
+    pinned = std::make_shared<const PinnedVersion>(account.parts(), served_.version);
+    served_.readers = pinned;
   }
-  const ServedHull* const shown = reading->served.get();
-  return {std::move(reading), shown};
+  const ServedHull* const shown = pinned->served.get();
+  return {std::move(pinned), shown};
 }
 
 void RegisteredHull::Prefetch() const {

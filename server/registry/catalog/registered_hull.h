@@ -217,8 +217,9 @@ class RegisteredHull {
     uint64_t head = 0;
   };
   // A served version while a reader holds it. Its memory counts until it is freed.
-  struct Reading {
-    Reading(std::shared_ptr<const MemoryParts> parts, std::shared_ptr<const ServedHull> served_hull)
+  struct PinnedVersion {
+    PinnedVersion(std::shared_ptr<const MemoryParts> parts,
+                  std::shared_ptr<const ServedHull> served_hull)
         : pin(std::move(parts)), served(std::move(served_hull)) {}
     const MemoryPin pin;
     const std::shared_ptr<const ServedHull> served;
@@ -263,7 +264,7 @@ class RegisteredHull {
     // Sum of the account's parts when they were last counted.
     uint64_t shared_bytes = 0;
     // Readers' reference to `version`.
-    std::weak_ptr<const Reading> readers;
+    std::weak_ptr<const PinnedVersion> readers;
   };
 
   void SetCommittedMark(Locked& locked, const LiveHull::Mark& mark);

@@ -35,10 +35,10 @@ PeerSync::PeerSync(RegistryState& state, Committer& committer)
 absl::Status PeerSync::Begin(Locked& locked, OnChange on_change) {
   if (!has_peers()) return absl::OkStatus();
   on_change_ = std::move(on_change);
-  const SteadyClock::time_point asked = SteadyClock::now();
+  const SteadyClock::time_point queried_at = SteadyClock::now();
   absl::Status fetched = feed_->Fetch();
   Apply(locked, feed_->TakeChanges());
-  if (fetched.ok()) NoteSynced(asked);
+  if (fetched.ok()) NoteSynced(queried_at);
   feed_->OnPeerCommit([this] { committer_.AddBarrier([](Locked&, const absl::Status&) {}); });
   return fetched;
 }

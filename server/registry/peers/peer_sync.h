@@ -93,7 +93,7 @@ class PeerSync : public Committer::Peers {
   // committed state does not change before Apply, because the same thread calls both.
   std::vector<HullGrowth> GrownHulls(const PeerChanges& changes) const override;
   void Apply(Locked& locked, const PeerChanges& changes) override;
-  void NoteSynced(SteadyClock::time_point asked) override { synced_at_ = asked; }
+  void NoteSynced(SteadyClock::time_point queried_at) override { synced_at_ = queried_at; }
 
  private:
   RegistryState& state_;

@@ -51,7 +51,7 @@ RegistryState::RegistryState(Store& store_in, const Limits& limits_in,
 }
 
 HullPointer RegistryState::Find(const std::string& id) {
-  std::optional<HullPointer> hull = hulls.Ask(id);
+  std::optional<HullPointer> hull = hulls.LookUp(id);
   HULLD_CHECK(hull.has_value() || bodies.contains(id));
   return std::move(hull).value_or(nullptr);
 }
@@ -294,8 +294,9 @@ bool RegistryState::ApplyPeerVersion(Locked& locked, const HullPointer& hull,
 void RegistryState::EndFormer(Locked& locked, const HullPointer& former, const PeerChange& change) {
   NoteChange(*former);
   former->Vanish();
-  Forget(locked, former,
-         Gone(former->committed().record.hull_id, change.hull.has_value() ? "replaced" : "deleted"));
+  Forget(
+      locked, former,
+      Gone(former->committed().record.hull_id, change.hull.has_value() ? "replaced" : "deleted"));
 }
 
 void RegistryState::ApplyPeerBody(Locked& locked, const std::string& id, const PeerChange& change) {

@@ -185,8 +185,8 @@ class PostgresStore : public Store, public PeerFeed {
   absl::StatusOr<bool> CheckFormat(Session& session) const;
   absl::StatusOr<bool> TryLock(Session& session) const;
   absl::StatusOr<std::string> Owner(Session& session) const;
-  void Keep();
-  absl::Status Beat();
+  void RunKeeper();
+  absl::Status CheckActive();
   absl::Status MeasureDisk();
   void End(const absl::Status& reason);
   // Returns the reason that this is not the active server. owner: the active server, if known.
@@ -198,7 +198,7 @@ class PostgresStore : public Store, public PeerFeed {
   absl::Status Attempt(std::span<Change* const> changes, Batch* batch);
   absl::Status SendBatch(std::vector<Statement> statements, const Batch& batch);
   void EndTransaction(const absl::Status& status);
-  void Keep(const Batch& batch);
+  void NoteCommitted(const Batch& batch);
   absl::StatusOr<bool> FindOutcome(uint64_t batch, std::chrono::steady_clock::time_point deadline);
   bool EndsWithin(std::chrono::milliseconds pause);
   absl::StatusOr<bool> Reclaim(uint64_t batch);
@@ -221,7 +221,7 @@ class PostgresStore : public Store, public PeerFeed {
   absl::StatusOr<bool> SharedOutcome(uint64_t batch);
   absl::Status EndStuckTransactions();
   void StartNotices();
-  bool HearsPeers() const;
+  bool ReceivesNotices() const;
   absl::Status PollPeers();
   void NotifyPeerCommit();
   static absl::Status CheckRecord(const HullRecord& hull, const Rows& rows);
@@ -280,7 +280,7 @@ class PostgresStore : public Store, public PeerFeed {
   std::unique_ptr<Session> keeper_session_;
   bool has_lock_ = false;
   // Shared: the last batch found by the keeper.
-  uint64_t looked_at_ = 0;
+  uint64_t polled_batch_ = 0;
   // Shared: created before the keeper starts.
   std::unique_ptr<BatchNotices> notices_;
   std::thread keeper_;
