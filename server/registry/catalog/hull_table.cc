@@ -21,7 +21,7 @@ HullRecord HullTable::RestingHull::RecordWith(const std::string& id) const {
   record.hull_id = id;
   record.create_revision = create_revision;
   record.revision = revision;
-  // NOLINTNEXTLINE(bugprone-signed-char-misuse): -1 is that of no points
+  // NOLINTNEXTLINE(bugprone-signed-char-misuse): -1 stands for no points
   record.dimension = dimension;
   record.vertex_count = vertex_count;
   record.counts = counts;

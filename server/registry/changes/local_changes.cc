@@ -44,9 +44,9 @@ void RestoreReplacement(RegisteredHull& hull, Change& change, Replacement& repla
 
 // Returns true if a change was refused: runs it again if a peer server superseded it, and answers
 // the caller otherwise.
-template <typename Reply>
+template <typename Refuse>
 bool IsRefused(Locked& locked, const absl::Status& status, const LockedTask& again,
-               const Reply& refuse) {
+               const Refuse& refuse) {
   if (Committer::IsSuperseded(status)) {
     locked.AfterwardsLocked(again);
   } else if (!status.ok()) {

@@ -26,7 +26,7 @@ namespace hulld::server {
 //
 // Peer changes are applied on the committer's thread, after the superseded local changes were
 // refused, so no local change to the same IDs is being committed. A thread may still build a chunk
-// on such a hull, or read its record; the state of the hull, or of the reading, shows that it was
+// on such a hull, or read its record; the state of the hull, or of the read, shows that it was
 // superseded. Tasks that depend on a changed ID run after all changes of the same fetch are applied
 // (Defer).
 //
