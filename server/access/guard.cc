@@ -38,19 +38,9 @@ absl::StatusOr<std::unique_ptr<Guard>> Guard::Load(const Config& config) {
   std::unique_ptr<Guard> guard(new Guard(config));
   HULLD_RETURN_IF_ERROR(guard->LoadAll());
   if (config.has_tls() || !config.tokens_file.empty()) {
-    guard->watcher_ = std::thread([guard = guard.get()] { guard->Watch(); });
+    guard->reloads_.emplace(Config::kReloadInterval, [guard = guard.get()] { guard->Reload(); });
   }
   return guard;
-}
-
-Guard::~Guard() {
-  if (!watcher_.joinable()) return;
-  {
-    const std::lock_guard lock(mutex_);
-    ending_ = true;
-  }
-  end_.notify_all();
-  watcher_.join();
 }
 
 absl::StatusOr<Caller> Guard::Authenticate(
@@ -157,15 +147,6 @@ absl::Status Guard::ReloadTokens() {
   }
   if (tokens_changed_) tokens_changed_();
   return absl::OkStatus();
-}
-
-void Guard::Watch() {
-  std::unique_lock lock(mutex_);
-  while (!end_.wait_for(lock, Config::kReloadInterval, [this] { return ending_; })) {
-    lock.unlock();
-    Reload();
-    lock.lock();
-  }
 }
 
 }  // namespace hulld::server
