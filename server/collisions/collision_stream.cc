@@ -35,8 +35,6 @@ namespace {
 
 // Pairs between two reads of the clock.
 constexpr size_t kPairsPerClaim = 16;
-// Decoding the poses of an update up to this size takes less than a slice.
-constexpr int kMaxShortUpdate = 4096;
 // An update that affects at most this many pairs is answered on arrival.
 constexpr int kMaxQuickPairs = 8;
 // Expected number of updates per stream: a guess, because streams are opened for many updates.

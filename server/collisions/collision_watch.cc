@@ -37,8 +37,6 @@ constexpr size_t kWatchedPairsPerPoll = 16;
 constexpr uint64_t kExpectedRounds = 256;
 // Tag and length of an entry within its message.
 constexpr size_t kEntryHeaderBytes = 4;
-// Decoding the poses of an update up to this size takes less than a slice.
-constexpr int kMaxShortUpdate = 4096;
 
 bool IsContact(v1::Relation relation) {
   return relation == v1::RELATION_TOUCHING || relation == v1::RELATION_OVERLAPPING;
