@@ -261,16 +261,16 @@ class CollisionStream
       ++helpers_waiting_;
       RunOn(lane_, [this] {
         --helpers_waiting_;
-        TakePart();
+        DecideBlocks();
       });
     }
-    TakePart();
+    DecideBlocks();
   }
 
   // Works on blocks until none is left, or until other calls are due. Runs on any thread, and on
   // several concurrently. The thread that returns the last block continues. A thread must not
   // access this stream after it returned the last block, or if it found no block.
-  void TakePart() {
+  void DecideBlocks() {
     const auto end = std::chrono::steady_clock::now() + TaskPool::kSliceTime;
     while (true) {
       const ClaimedRange::Block block = unclaimed_.Claim(kPairsPerClaim);
@@ -281,7 +281,7 @@ class CollisionStream
         for (uint32_t i = block.begin; i < block.end; ++i) Decide(i);
       }
       if (unclaimed_.GiveBack(block)) return AnswerSlice();
-      if (std::chrono::steady_clock::now() >= end) return RunOn(lane_, [this] { TakePart(); });
+      if (std::chrono::steady_clock::now() >= end) return RunOn(lane_, [this] { DecideBlocks(); });
     }
   }
 

@@ -21,7 +21,7 @@
 #include "server/call/service_parts.h"
 #include "server/collisions/placed/placement_table.h"
 #include "server/collisions/placed/query_settings.h"
-#include "server/process/shared_loop.h"
+#include "server/process/parallel_loop.h"
 #include "server/process/task_pool.h"
 #include "server/registry/registry.h"
 #include "server/registry/waiting_calls.h"
@@ -148,9 +148,9 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
 
   // Runs `work` on disjoint ranges that cover [0, count), on several threads concurrently for a
   // long call. Used by the steps above.
-  void ShareOut(size_t count, size_t step, const std::function<void(size_t, size_t)>& work) {
+  void ParallelFor(size_t count, size_t step, const std::function<void(size_t, size_t)>& work) {
     if (IsShort()) return work(0, count);
-    SharedLoop::Run(parts_.long_readers, max_pieces_ / 2 - 1, count, step, work);
+    ParallelLoop::Run(parts_.long_readers, max_pieces_ / 2 - 1, count, step, work);
   }
 
   // Performs a step on the next unit of the piece, which takes a few microseconds, or until `end`

@@ -118,7 +118,7 @@ class SceneStream
     const bool moves = table_.has_motions();
     std::vector<Box> boxes(moves ? 0 : table_.size());
     std::vector<MovingBox> moving(moves ? table_.size() : 0);
-    ShareOut(table_.size(), kBoxesPerStep, [&](size_t begin, size_t end) {
+    ParallelFor(table_.size(), kBoxesPerStep, [&](size_t begin, size_t end) {
       if (call().ShouldStop()) return;
       for (size_t i = begin; i < end; ++i) {
         if (moves) {

@@ -301,7 +301,7 @@ absl::StatusOr<LocalChanges::BuiltChunk> LocalChanges::Build(Locked& locked, Reg
   hull.state.StartBuilding();
   const absl::StatusOr<std::shared_ptr<LiveHull>> live = LiveForWriter(locked, hull);
   if (Committer::IsSuperseded(live.status())) return live.status();
-  if (!live.ok()) return WhyNotBuilt(hull, live.status());
+  if (!live.ok()) return BuildFailure(hull, live.status());
   BuiltChunk built;
   Change& change = built.change;
   change.hull = hull.head();
@@ -321,7 +321,7 @@ absl::StatusOr<LocalChanges::BuiltChunk> LocalChanges::Build(Locked& locked, Reg
     if (peers_.has_peers()) return Superseded();
     return absl::UnavailableError("an earlier change could not be stored");
   }
-  if (!added.ok()) return WhyNotBuilt(hull, added.status());
+  if (!added.ok()) return BuildFailure(hull, added.status());
   if (hull.state.damaged()) {
     hull.DiscardBuilder(locked);
     return hull.state.damage();
@@ -399,7 +399,7 @@ absl::StatusOr<PointCounts> LocalChanges::AddPoints(PendingChunk& pending, LentB
 }
 
 // Returns the writer's status for a failure of AddPoints.
-absl::Status LocalChanges::WhyNotBuilt(RegisteredHull& hull, const absl::Status& cause) {
+absl::Status LocalChanges::BuildFailure(RegisteredHull& hull, const absl::Status& cause) {
   if (absl::IsDataLoss(cause)) state_.MarkDamaged(hull, cause);
   if (!absl::IsResourceExhausted(cause)) return cause;
   return LimitExceeded(

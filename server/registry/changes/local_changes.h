@@ -141,7 +141,7 @@ class LocalChanges {
   absl::StatusOr<std::shared_ptr<LiveHull>> LiveForWriter(Locked& locked, RegisteredHull& hull);
   absl::StatusOr<PointCounts> AddPoints(PendingChunk& pending, LentBuilder& lent, LiveHull& live,
                                         BuiltChunk& built);
-  absl::Status WhyNotBuilt(RegisteredHull& hull, const absl::Status& cause);
+  absl::Status BuildFailure(RegisteredHull& hull, const absl::Status& cause);
   void SubmitChunk(Locked& locked, const HullPointer& hull, PendingChunk& pending,
                    BuiltChunk built);
 

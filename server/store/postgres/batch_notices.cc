@@ -22,7 +22,7 @@ using Clock = std::chrono::steady_clock;
 // A database contains one store, so the channel's name need not identify it.
 constexpr char kListen[] = "LISTEN hulld_batches";
 constexpr char kNotify[] = "NOTIFY hulld_batches";
-constexpr std::chrono::milliseconds kForEver{-1};
+constexpr std::chrono::milliseconds kForever{-1};
 // Retry delay after the database refused to listen.
 constexpr std::chrono::minutes kRefusedRetry{1};
 
@@ -104,7 +104,7 @@ absl::Status BatchNotices::Serve() {
       uint64_t received = 0;
       if (absl::SimpleAtoi(payload, &received)) NoteReceived(received);
     }
-    const auto longest = to_send_ == sent_ ? kForEver : UpTo(next);
+    const auto longest = to_send_ == sent_ ? kForever : UpTo(next);
     HULLD_RETURN_IF_ERROR(session.AwaitNotices(wake_, longest));
   }
 }

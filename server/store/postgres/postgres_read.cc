@@ -168,7 +168,7 @@ absl::StatusOr<std::vector<Vector>> PostgresStore::LoadVertices(const StoredHull
   }
   absl::StatusOr<std::vector<Vector>> vertices = std::move(assembly).Finish(std::move(status));
   if (!options_.shared || !absl::IsDataLoss(vertices.status())) return vertices;
-  return WhyDamaged(hull, vertices.status());
+  return ExplainDamage(hull, vertices.status());
 }
 
 // The data may be newer than the requested versions, and then does not match them.

@@ -218,7 +218,7 @@ void PostgresStore::StartFetch() {
 absl::Status PostgresStore::Fetch() {
   std::unique_ptr<Session> started = std::exchange(fetching_, nullptr);
   if (absl::Status s = ended(); !s.ok()) {
-    follower_.GiveUp(std::move(started));
+    follower_.Drop(std::move(started));
     return s;
   }
   const Statement fetch = FetchStatement(batch_);
@@ -351,7 +351,7 @@ absl::Status PostgresStore::CheckRecord(const HullRecord& hull, const Rows& rows
 }
 
 // Explains vertices that contradict the record. ABORTED: a peer server changed the hull since.
-absl::Status PostgresStore::WhyDamaged(const StoredHull& hull, const absl::Status& damage) {
+absl::Status PostgresStore::ExplainDamage(const StoredHull& hull, const absl::Status& damage) {
   HULLD_ASSIGN_OR_RETURN(const Rows rows,
                          ReadOne({.name = "hulld_record", .parameters = {hull.record.hull_id}}));
   if (rows.count() == 0) return Moved();

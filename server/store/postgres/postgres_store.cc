@@ -117,12 +117,12 @@ absl::StatusOr<bool> PostgresStore::FindOutcome(uint64_t batch, Clock::time_poin
     }
     // A server that is the only active one can determine the outcome even after it was superseded.
     if (options_.shared && !ended().ok()) return outcome;
-    if (Clock::now() + pause >= deadline || EndsWithin(pause)) return outcome;
+    if (Clock::now() + pause >= deadline || AwaitEnd(pause)) return outcome;
   }
 }
 
 // Waits; returns true if this server ends during the wait.
-bool PostgresStore::EndsWithin(std::chrono::milliseconds pause) {
+bool PostgresStore::AwaitEnd(std::chrono::milliseconds pause) {
   std::unique_lock lock(mutex_);
   return wake_.wait_for(lock, pause, [this] { return ending_; });
 }
@@ -213,7 +213,7 @@ absl::Status PostgresStore::Commit(std::span<Change* const> changes) {
       }
       if (absl::Status s = ended(); !s.ok()) return WriteFailed(s);
     }
-    if (Clock::now() + pause >= deadline || EndsWithin(pause)) return WriteFailed(Refused(status));
+    if (Clock::now() + pause >= deadline || AwaitEnd(pause)) return WriteFailed(Refused(status));
   }
 }
 

@@ -200,7 +200,7 @@ class PostgresStore : public Store, public PeerFeed {
   void EndTransaction(const absl::Status& status);
   void NoteCommitted(const Batch& batch);
   absl::StatusOr<bool> FindOutcome(uint64_t batch, std::chrono::steady_clock::time_point deadline);
-  bool EndsWithin(std::chrono::milliseconds pause);
+  bool AwaitEnd(std::chrono::milliseconds pause);
   absl::StatusOr<bool> Reclaim(uint64_t batch);
   absl::StatusOr<bool> OutcomeBeforePeers(uint64_t batch);
   absl::Status WriteFailed(const absl::Status& status);
@@ -225,7 +225,7 @@ class PostgresStore : public Store, public PeerFeed {
   absl::Status PollPeers();
   void NotifyPeerCommit();
   static absl::Status CheckRecord(const HullRecord& hull, const Rows& rows);
-  absl::Status WhyDamaged(const StoredHull& hull, const absl::Status& damage);
+  absl::Status ExplainDamage(const StoredHull& hull, const absl::Status& damage);
 
   // Visits every row of a table, in byte order of the IDs: its ID and its sealed value.
   absl::Status ForEachRow(const char* statement,

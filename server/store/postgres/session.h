@@ -161,7 +161,7 @@ class SessionPool {
   // statements: as passed to TryStart.
   absl::StatusOr<std::vector<Rows>> Finish(std::unique_ptr<Session> session,
                                            std::span<const Statement> statements);
-  void GiveUp(std::unique_ptr<Session> session) {
+  void Drop(std::unique_ptr<Session> session) {
     if (session != nullptr) GiveBack(nullptr);
   }
 
