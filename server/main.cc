@@ -70,7 +70,7 @@ int WaitForEnd(const sigset_t& signals, Server& server) {
 }
 
 // Returns true if a pending signal asks the process to end.
-bool IsEndAsked() {
+bool IsTerminationPending() {
   sigset_t pending;
   sigpending(&pending);
   return sigismember(&pending, SIGTERM) == 1 || sigismember(&pending, SIGINT) == 1;
@@ -109,7 +109,8 @@ int Run(const Config& config) {
 
   // Outlives the server.
   std::atomic<bool> store_ended = false;
-  const absl::StatusOr<std::unique_ptr<Server>> server = Server::Start(config, IsEndAsked);
+  const absl::StatusOr<std::unique_ptr<Server>> server =
+      Server::Start(config, IsTerminationPending);
   if (absl::IsCancelled(server.status())) {
     spdlog::info("{}", std::string(server.status().message()));
     return 0;

@@ -21,10 +21,10 @@ absl::Status Missing(const char* message) {
 }
 
 // Logs each new error of a file, and its recovery, once.
-void Complain(const char* what, const absl::Status& status, std::string* complaint) {
+void LogNewError(const char* what, const absl::Status& status, std::string* last_error) {
   const std::string message(status.message());
-  if (message == *complaint) return;
-  *complaint = message;
+  if (message == *last_error) return;
+  *last_error = message;
   if (status.ok()) {
     spdlog::info("{} are readable again", what);
   } else {
@@ -38,19 +38,9 @@ absl::StatusOr<std::unique_ptr<Guard>> Guard::Load(const Config& config) {
   std::unique_ptr<Guard> guard(new Guard(config));
   HULLD_RETURN_IF_ERROR(guard->LoadAll());
   if (config.has_tls() || !config.tokens_file.empty()) {
-    guard->watcher_ = std::thread([guard = guard.get()] { guard->Watch(); });
+    guard->reloads_.emplace(Config::kReloadInterval, [guard = guard.get()] { guard->Reload(); });
   }
   return guard;
-}
-
-Guard::~Guard() {
-  if (!watcher_.joinable()) return;
-  {
-    const std::lock_guard lock(mutex_);
-    ending_ = true;
-  }
-  end_.notify_all();
-  watcher_.join();
 }
 
 absl::StatusOr<Caller> Guard::Authenticate(
@@ -99,8 +89,8 @@ absl::Status Guard::LoadAll() {
 
 void Guard::Reload() {
   const std::lock_guard lock(mutex_);
-  if (config_.has_tls()) Complain("the TLS certificates", ReloadTls(), &tls_complaint_);
-  if (!config_.tokens_file.empty()) Complain("the tokens", ReloadTokens(), &tokens_complaint_);
+  if (config_.has_tls()) LogNewError("the TLS certificates", ReloadTls(), &tls_error_);
+  if (!config_.tokens_file.empty()) LogNewError("the tokens", ReloadTokens(), &tokens_error_);
 }
 
 void Guard::OnTokensChanged(std::function<void()> changed) {
@@ -157,15 +147,6 @@ absl::Status Guard::ReloadTokens() {
   }
   if (tokens_changed_) tokens_changed_();
   return absl::OkStatus();
-}
-
-void Guard::Watch() {
-  std::unique_lock lock(mutex_);
-  while (!end_.wait_for(lock, Config::kReloadInterval, [this] { return ending_; })) {
-    lock.unlock();
-    Reload();
-    lock.lock();
-  }
 }
 
 }  // namespace hulld::server

@@ -5,17 +5,17 @@
 #include <grpcpp/grpcpp.h>
 
 #include <atomic>
-#include <condition_variable>
 #include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
-#include <thread>
 
 #include "server/access/caller.h"
 #include "server/access/tls_credentials.h"
 #include "server/access/token_table.h"
+#include "server/process/periodic_task.h"
 #include "server/settings/config.h"
 
 namespace hulld::server {
@@ -31,7 +31,6 @@ class Guard {
 
   Guard(const Guard&) = delete;
   Guard& operator=(const Guard&) = delete;
-  ~Guard();
 
   // Returns the caller, identified by "authorization: Bearer TOKEN" in the metadata of a call.
   // Without --tokens-file, every caller has all rights. UNAUTHENTICATED: the token is missing or
@@ -62,7 +61,6 @@ class Guard {
   // Refuses all further connections.
   void RevokeAuthorities();
   absl::Status ReloadTokens();
-  void Watch();
 
   const Config config_;
   // Null without TLS.
@@ -74,14 +72,13 @@ class Guard {
   std::mutex mutex_;
   // The current TLS identity, and the last logged error of each kind of file.
   TlsIdentity identity_;
-  std::string tls_complaint_;
-  std::string tokens_complaint_;
+  std::string tls_error_;
+  std::string tokens_error_;
 
   std::function<void()> tokens_changed_;
 
-  bool ending_ = false;
-  std::condition_variable end_;
-  std::thread watcher_;
+  // Last member, because it uses the others.
+  std::optional<PeriodicTask> reloads_;
 };
 
 }  // namespace hulld::server

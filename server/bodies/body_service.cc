@@ -144,16 +144,12 @@ class BodyService : public BodyServiceOfBytes {
         *std::move(body), IfRevision(call->request()),
         [this, call](const absl::StatusOr<PutBodyResult>& result) {
           if (!result.ok()) return call->End(result.status());
-          const BodyRecord& record = result->body;
+          const HullRecord& record = result->body.record;
           call->call().LogChange(result->created ? "body created" : "body replaced",
-                                 {"body", record.body_id}, record.revision);
+                                 {"body", record.hull_id}, record.revision);
           v1::PutBodyResponse& response = call->response();
           EncodeHeader(parts_.store, result->store_revision, response.mutable_header());
-          v1::BodyInfo* const info = response.mutable_body();
-          info->set_body_id(record.body_id);
-          info->set_create_revision(record.create_revision);
-          info->set_revision(record.revision);
-          info->set_piece_count(result->piece_count);
+          EncodeBody(result->body, response.mutable_body());
           response.set_created(result->created);
           response.set_durability(EncodeDurability(parts_.store.durability()));
           call->End(absl::OkStatus());
@@ -164,8 +160,8 @@ class BodyService : public BodyServiceOfBytes {
                    std::chrono::nanoseconds staleness, v1::GetBodyResponse* response) {
     const std::string& id = request.body_id();
     HULLD_RETURN_IF_ERROR(CheckHullId(call.caller(), id, "body_id"));
-    const FoundBodies found = parts_.registry.records().FindBodies(
-        std::span(&id, 1), [&call] { return call.ShouldStop(); });
+    const FoundBodies found =
+        parts_.registry.records().FindBodies(std::span(&id, 1), call.should_stop());
     if (!found.status.ok()) return found.status;
     const std::shared_ptr<const Body>& body = found.bodies.front();
     if (body == nullptr) return BodyNotFound(id);

@@ -47,7 +47,7 @@ Admission::Admission(const Limits& limits, Metrics& metrics, ConnectionTable& co
       request_memory_(limits.request_memory) {
   metrics_.AddGauge("hulld_request_bytes", "Bytes held by requests in flight.",
                     [this] { return static_cast<double>(request_memory_.taken_bytes()); });
-  watchman_ = std::thread([this] { CancelOverdue(); });
+  watchdog_ = std::thread([this] { CancelOverdue(); });
 }
 
 Admission::~Admission() {
@@ -57,7 +57,7 @@ Admission::~Admission() {
     ending_ = true;
     watched_changed_.notify_all();
   }
-  watchman_.join();
+  watchdog_.join();
 }
 
 Admission::Ticket::Share Admission::ShareOf(const Arrival& arrival, uint64_t connection) const {

@@ -204,7 +204,7 @@ class Admission {
   std::chrono::steady_clock::time_point next_check_ = kNever;
   std::condition_variable watched_changed_;
   bool ending_ = false;
-  std::thread watchman_;
+  std::thread watchdog_;
 };
 
 }  // namespace hulld::server

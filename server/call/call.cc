@@ -2,6 +2,7 @@
 
 #include <absl/strings/ascii.h>
 #include <absl/strings/str_cat.h>
+#include <google/protobuf/util/time_util.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -88,8 +89,8 @@ std::string EncodeErrorDetails(const absl::Status& status, const std::string& re
   }
   if (const auto delay = RetryAfter(status); delay.has_value()) {
     rpc::RetryInfo retry;
-    retry.mutable_retry_delay()->set_seconds(delay->count() / 1000);
-    retry.mutable_retry_delay()->set_nanos(static_cast<int32_t>(delay->count() % 1000 * 1'000'000));
+    *retry.mutable_retry_delay() =
+        google::protobuf::util::TimeUtil::MillisecondsToDuration(delay->count());
     AddDetail(retry, &message);
   }
   return message.SerializeAsString();

@@ -65,6 +65,10 @@ class Call {
 
   const CallLifetime& lifetime() const { return lifetime_; }
   bool ShouldStop() const { return lifetime_.ShouldStop(); }
+  // Returns ShouldStop as a function, which must not outlive this object.
+  std::function<bool()> should_stop() const {
+    return [this] { return ShouldStop(); };
+  }
   bool is_revoked() const { return lifetime_.is_revoked(); }
   // Requires ShouldStop(), as CallLifetime::StopStatus does.
   absl::Status StopStatus() const { return lifetime_.StopStatus(); }

@@ -31,9 +31,9 @@ constexpr uint64_t kUnknown = 2 * 16 + kText;
 // The set itself, which each message may have.
 constexpr uint64_t kUnknownSet = 48;
 // Protobuf's depth limit.
-constexpr int kDeepest = 100;
+constexpr int kMaxDepth = 100;
 // Field numbers of the contract are small. A larger one counts as unknown, which needs more memory.
-constexpr int kLargestNumber = 255;
+constexpr int kMaxFieldNumber = 255;
 
 }  // namespace
 
@@ -60,7 +60,7 @@ MessageLayout::MessageLayout(const Descriptor& type) {
   own_bytes_ = empty->SpaceUsedLong() + kAllocation + kUnknownSet;
   for (int i = 0; i < type.field_count(); ++i) {
     const FieldDescriptor& described = *type.field(i);
-    if (described.number() > kLargestNumber) continue;
+    if (described.number() > kMaxFieldNumber) continue;
     const auto number = static_cast<size_t>(described.number());
     if (number >= fields_.size()) fields_.resize(number + 1);
     Field& field = fields_[number];
@@ -140,7 +140,7 @@ bool MessageLayout::CountDelimited(CodedInputStream& input, const Field& field, 
   if (!input.ReadVarintSizeAsInt(&length)) return false;
   const bool is_whole = length <= input.BytesUntilLimit();
   if (field.message != nullptr) {
-    if (depth >= kDeepest) return false;
+    if (depth >= kMaxDepth) return false;
     const CodedInputStream::Limit outer = input.PushLimit(length);
     field.message->Count(input, most, depth + 1, bytes);
     const bool is_read = input.BytesUntilLimit() == 0;

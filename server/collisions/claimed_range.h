@@ -10,9 +10,10 @@
 namespace hulld::server {
 
 // A range of work, [0, count), that several threads claim block by block, starting from its end.
-// Unlike in SharedLoop, no thread waits: the thread that returns the last block continues with the
-// next step, and a thread that arrives after all blocks are claimed finds nothing. This also holds
-// after the next range has begun or the owner has ended its work. Any thread may claim at any time.
+// Unlike in ParallelLoop, no thread waits: the thread that returns the last block continues with
+// the next step, and a thread that arrives after all blocks are claimed finds nothing. This also
+// holds after the next range has begun or the owner has ended its work. Any thread may claim at any
+// time.
 class ClaimedRange {
  public:
   struct Block {

@@ -1,8 +1,6 @@
 #include "server/collisions/collision_service.h"
 
 #include "hulld/v1/collision.grpc.pb.h"
-#include "server/collisions/collision_calls.h"
-#include "server/collisions/watch/collision_watch.h"
 
 namespace hulld::server {
 namespace {

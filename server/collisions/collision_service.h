@@ -5,6 +5,7 @@
 
 #include <memory>
 
+#include "server/call/message_bytes.h"
 #include "server/call/service_parts.h"
 
 namespace hulld::server {
@@ -17,6 +18,15 @@ namespace hulld::server {
 // pair) or `long_readers` (for many hulls). TEXTBOOK_SAT pairs are answered in slices that
 // alternate with other calls. The parts must outlive the service.
 std::unique_ptr<grpc::Service> MakeCollisionService(const ServiceParts& parts);
+
+// The calls of the service. Each function starts a call and returns its reactor, which owns itself
+// until gRPC releases it. request, response: owned by gRPC until the call ends.
+UnaryReactor* StartCheck(CallContext& context, const ServiceParts& parts, const Bytes& request,
+                         Bytes* response);
+WriteReactor* StartBatch(CallContext& context, const ServiceParts& parts, const Bytes& request);
+WriteReactor* StartScene(CallContext& context, const ServiceParts& parts, const Bytes& request);
+BidiReactor* StartCollisionStream(CallContext& context, const ServiceParts& parts);
+BidiReactor* StartCollisionWatch(CallContext& context, const ServiceParts& parts);
 
 }  // namespace hulld::server
 

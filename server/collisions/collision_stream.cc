@@ -19,7 +19,7 @@
 #include "server/call/pulled_stream.h"
 #include "server/call/service_parts.h"
 #include "server/collisions/claimed_range.h"
-#include "server/collisions/collision_calls.h"
+#include "server/collisions/collision_service.h"
 #include "server/collisions/placed/live_pairs.h"
 #include "server/collisions/placed/placed_answer.h"
 #include "server/collisions/placed/placement_table.h"
@@ -35,8 +35,6 @@ namespace {
 
 // Pairs between two reads of the clock.
 constexpr size_t kPairsPerClaim = 16;
-// Decoding the poses of an update up to this size takes less than a slice.
-constexpr int kMaxShortUpdate = 4096;
 // An update that affects at most this many pairs is answered on arrival.
 constexpr int kMaxQuickPairs = 8;
 // Expected number of updates per stream: a guess, because streams are opened for many updates.
@@ -125,14 +123,14 @@ class CollisionStream
   void Handle() {
     pairs_.EndRound();
     decided_.clear();
-    next_asked_ = 0;
+    next_pair_ = 0;
     refresh_.reset();
     const absl::Status status = HandleMessage();
     if (!status.ok() || !refresh_.has_value()) return AnswerMessage(status);
     // No thread waits for a store query, because an unresponsive store would block all threads.
     TaskPool& threads = messages_ == 0 ? parts_.long_readers : parts_.readers;
     const bool awaits = parts_.waiting.AwaitFresh(
-        parts_.registry, refresh_->freshness, [this] { return call().ShouldStop(); },
+        parts_.registry, refresh_->freshness, call().should_stop(),
         [this, &threads, self = shared_from_this()](const absl::Status& fresh) {
           RunOn(threads, [this, fresh] { AnswerMessage(OfMessage(fresh)); });
         });
@@ -234,7 +232,7 @@ class CollisionStream
     LivePair& pair = pairs_.pair(index);
     const bool answerable = table_.is_answerable(pair.a) && table_.is_answerable(pair.b);
     PlacedAnswer answer;
-    if (answerable) answer = AskAtRest(table_, pair.a, pair.b, options_, &pair.cache);
+    if (answerable) answer = QueryAtRest(table_, pair.a, pair.b, options_, &pair.cache);
     const bool is_answered = answerable && answer.answer.ok();
     if (is_answered) rungs_.Add(answer.answer->rung);
     const v1::Relation relation =
@@ -263,16 +261,16 @@ class CollisionStream
       ++helpers_waiting_;
       RunOn(lane_, [this] {
         --helpers_waiting_;
-        TakePart();
+        DecideBlocks();
       });
     }
-    TakePart();
+    DecideBlocks();
   }
 
   // Works on blocks until none is left, or until other calls are due. Runs on any thread, and on
   // several concurrently. The thread that returns the last block continues. A thread must not
   // access this stream after it returned the last block, or if it found no block.
-  void TakePart() {
+  void DecideBlocks() {
     const auto end = std::chrono::steady_clock::now() + TaskPool::kSliceTime;
     while (true) {
       const ClaimedRange::Block block = unclaimed_.Claim(kPairsPerClaim);
@@ -283,7 +281,7 @@ class CollisionStream
         for (uint32_t i = block.begin; i < block.end; ++i) Decide(i);
       }
       if (unclaimed_.GiveBack(block)) return AnswerSlice();
-      if (std::chrono::steady_clock::now() >= end) return RunOn(lane_, [this] { TakePart(); });
+      if (std::chrono::steady_clock::now() >= end) return RunOn(lane_, [this] { DecideBlocks(); });
     }
   }
 
@@ -326,15 +324,15 @@ class CollisionStream
       if (next_row_ < table_.table_rows()) return SendPart(false);
       reply_bytes_ = reply().ByteSizeLong();
     }
-    const bool is_plain = AsksRelationsOfHulls(options_, table_);
-    const std::span<const uint32_t> asked = pairs_.selected();
-    if (is_plain && decided_.size() < asked.size()) return DecideTogether();
+    const bool is_plain = WantsRelationsOfHulls(options_, table_);
+    const std::span<const uint32_t> selected = pairs_.selected();
+    if (is_plain && decided_.size() < selected.size()) return DecideTogether();
     const auto end = std::chrono::steady_clock::now() + TaskPool::kSliceTime;
-    const size_t pairs_per_look =
+    const size_t pairs_per_poll =
         is_plain ? kPairsPerClockRead : (table_.has_bodies() ? 1 : kPairsPerClaim);
-    while (next_asked_ < asked.size() && reply_bytes_ < FullMessageBytes(wanted_)) {
-      is_plain ? AddDecided(next_asked_) : AddAnswer(asked[next_asked_]);
-      if (++next_asked_ % pairs_per_look != 0) continue;
+    while (next_pair_ < selected.size() && reply_bytes_ < FullMessageBytes(wanted_)) {
+      is_plain ? AddDecided(next_pair_) : AddAnswer(selected[next_pair_]);
+      if (++next_pair_ % pairs_per_poll != 0) continue;
       if (call().ShouldStop()) break;
       if (std::chrono::steady_clock::now() >= end) {
         return RunOn(lane_, [this] { AnswerSlice(); });
@@ -342,7 +340,7 @@ class CollisionStream
     }
     call().metrics().CountPairs(std::exchange(rungs_, {}));
     if (call().ShouldStop()) return FinishCall(call().StopStatus());
-    const bool is_last = next_asked_ == pairs_.selected().size();
+    const bool is_last = next_pair_ == pairs_.selected().size();
     if (is_last) call().EndMessage();
     SendPart(is_last);
   }
@@ -377,7 +375,7 @@ class CollisionStream
   // The current message queries the selected pairs, in ascending order.
   LivePairs pairs_;
   // Index of the next selected pair to answer.
-  size_t next_asked_ = 0;
+  size_t next_pair_ = 0;
   RungCounts rungs_;
 
   // Results of a plain answer, decided by several threads; then parallel to the selected pairs.

@@ -14,7 +14,7 @@
 #include "hulld/v1/collision.pb.h"
 #include "server/call/service_parts.h"
 #include "server/call/unary_call.h"
-#include "server/collisions/collision_calls.h"
+#include "server/collisions/collision_service.h"
 #include "server/collisions/placed/placed_answer.h"
 #include "server/collisions/placed/placement_table.h"
 #include "server/collisions/placed/query_settings.h"
@@ -137,7 +137,7 @@ class PairQuery : public std::enable_shared_from_this<PairQuery> {
     if (absl::Status s = Begin(); !s.ok()) return call_->End(s);
     // Answers to a client with many calls take turns in the pool, because gRPC's threads process
     // calls in the order of arrival.
-    const bool is_quick = AsksRelationsOfHulls(options_, table_) &&
+    const bool is_quick = WantsRelationsOfHulls(options_, table_) &&
                           IsQuickToRelate(table_.HullAt(kA)) &&
                           IsQuickToRelate(table_.HullAt(kB)) && !call_->call().is_one_of_many();
     if (is_quick) return RunSlice();

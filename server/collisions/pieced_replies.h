@@ -21,7 +21,7 @@
 #include "server/call/service_parts.h"
 #include "server/collisions/placed/placement_table.h"
 #include "server/collisions/placed/query_settings.h"
-#include "server/process/shared_loop.h"
+#include "server/process/parallel_loop.h"
 #include "server/process/task_pool.h"
 #include "server/registry/registry.h"
 #include "server/registry/waiting_calls.h"
@@ -103,13 +103,13 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     // True if the first answers may join the last message of the head.
     bool joins_head;
     // Steps between two reads of the clock, for pairs of hulls at rest.
-    uint64_t steps_per_look;
+    uint64_t steps_per_poll;
   };
 
   PiecedReplies(const Bytes& request, CallContext& context, Rpc rpc, const ServiceParts& parts,
                 const Shape& shape)
       : Base(request, context, parts.admission, rpc),
-        steps_per_look_(shape.steps_per_look),
+        steps_per_poll_(shape.steps_per_poll),
         parts_(parts),
         lane_(parts.pool),
         max_pieces_(2 * parts.pool.threads()),
@@ -148,9 +148,9 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
 
   // Runs `work` on disjoint ranges that cover [0, count), on several threads concurrently for a
   // long call. Used by the steps above.
-  void ShareOut(size_t count, size_t step, const std::function<void(size_t, size_t)>& work) {
+  void ParallelFor(size_t count, size_t step, const std::function<void(size_t, size_t)>& work) {
     if (IsShort()) return work(0, count);
-    SharedLoop::Run(parts_.long_readers, max_pieces_ / 2 - 1, count, step, work);
+    ParallelLoop::Run(parts_.long_readers, max_pieces_ / 2 - 1, count, step, work);
   }
 
   // Performs a step on the next unit of the piece, which takes a few microseconds, or until `end`
@@ -206,7 +206,7 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   // Minimum number of pairs that the call queries.
   uint64_t expected_pairs_ = 0;
   // Steps between two reads of the clock. Written while no slice runs.
-  uint64_t steps_per_look_;
+  uint64_t steps_per_poll_;
 
  private:
   // Returns true if preparation takes at most about a slice, excluding waits.
@@ -225,11 +225,10 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   // Returns true if the call waits for the store without occupying a thread. It is then opened
   // after the store answers.
   bool AwaitsFresh() {
-    const auto should_stop = [this] { return this->call().ShouldStop(); };
     const auto open = [this, self = this->shared_from_this()](const absl::Status& status) {
       this->RunOn(parts_.long_readers, [this, status] { OpenWith(status, true); });
     };
-    return parts_.waiting.AwaitFresh(registry(), freshness_, should_stop, open);
+    return parts_.waiting.AwaitFresh(registry(), freshness_, this->call().should_stop(), open);
   }
 
   void OpenWith(absl::Status status, bool may_wait) {
@@ -252,7 +251,7 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
       opening_ = false;
       if (!status.ok()) return this->End(status);
       const bool is_slow = table_.has_bodies() || table_.has_motions() || IsTextbook();
-      if (is_slow) steps_per_look_ = 1;
+      if (is_slow) steps_per_poll_ = 1;
       unit_count_ = CountUnits();
     });
   }
@@ -276,7 +275,7 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   // Works on the piece until `end`, or until it is done.
   absl::Status Advance(Work& piece, Clock::time_point end) {
     do {
-      for (uint64_t left = steps_per_look_; left > 0 && !piece.is_done(); --left) {
+      for (uint64_t left = steps_per_poll_; left > 0 && !piece.is_done(); --left) {
         HULLD_RETURN_IF_ERROR(Step(piece, end));
       }
     } while (!piece.is_done() && Clock::now() < end);

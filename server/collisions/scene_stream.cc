@@ -16,7 +16,7 @@
 #include "core/query/motion/first_contact.h"
 #include "core/query/scene/scene.h"
 #include "hulld/v1/collision.pb.h"
-#include "server/collisions/collision_calls.h"
+#include "server/collisions/collision_service.h"
 #include "server/collisions/pieced_replies.h"
 #include "server/collisions/placed/placed_answer.h"
 #include "server/collisions/placed/placement_table.h"
@@ -98,7 +98,7 @@ class SceneStream
                        .max_units = kMaxPlacements,
                        .max_short_placements = kMaxBoxesPerSlice,
                        .joins_head = false,
-                       .steps_per_look = kStepsPerPoll}) {}
+                       .steps_per_poll = kStepsPerPoll}) {}
 
  private:
   absl::Status Validate() override {
@@ -118,7 +118,7 @@ class SceneStream
     const bool moves = table_.has_motions();
     std::vector<Box> boxes(moves ? 0 : table_.size());
     std::vector<MovingBox> moving(moves ? table_.size() : 0);
-    ShareOut(table_.size(), kBoxesPerStep, [&](size_t begin, size_t end) {
+    ParallelFor(table_.size(), kBoxesPerStep, [&](size_t begin, size_t end) {
       if (call().ShouldStop()) return;
       for (size_t i = begin; i < end; ++i) {
         if (moves) {
@@ -167,7 +167,7 @@ class SceneStream
       OpenBodies(a, *b, piece);
       return absl::OkStatus();
     }
-    HULLD_ASSIGN_OR_RETURN(PlacedAnswer found, AskCandidate(a, *b, piece));
+    HULLD_ASSIGN_OR_RETURN(PlacedAnswer found, QueryCandidate(a, *b, piece));
     if (found.answer.ok() && !search_->IsFound(*found.answer)) return absl::OkStatus();
     if (ranking_ != nullptr) return Rank(a, *b, std::move(found), piece);
     ++piece.counts.found[AddFound(a, *b, found, piece)];
@@ -188,7 +188,7 @@ class SceneStream
     ranked_ = ranking_->Take();
     query_ = ranked_query_;
     motion_options_.want_certificate = query_.want_certificate;
-    steps_per_look_ = 1;
+    steps_per_poll_ = 1;
     return ranked_.size();
   }
 
@@ -245,8 +245,8 @@ class SceneStream
   absl::Status AnswerRanked(ScenePiece& piece) {
     const RankedPair& pair = ranked_[piece.next - search_->size()];
     const PlacedAnswer found = request().first_only()
-                                   ? AskFirst(pair.a, pair.b, motion_options_)
-                                   : AskPlaced(table_, pair.a, pair.b, query_, motion_options_);
+                                   ? QueryFirst(pair.a, pair.b, motion_options_)
+                                   : QueryPlaced(table_, pair.a, pair.b, query_, motion_options_);
     if (absl::IsCancelled(found.answer.status())) return found.answer.status();
     ++piece.next;
     // The pair was ranked, or failed, before the first contact was known.
@@ -303,12 +303,12 @@ class SceneStream
 
   // Answers a candidate and counts it. In a scene with a limit, answers only its relation and
   // clearance. CANCELLED.
-  absl::StatusOr<PlacedAnswer> AskCandidate(uint32_t a, uint32_t b, ScenePiece& piece) {
+  absl::StatusOr<PlacedAnswer> QueryCandidate(uint32_t a, uint32_t b, ScenePiece& piece) {
     PlacedAnswer found;
     if (request().first_only()) {
-      found = AskFirst(a, b, motion_options_);
+      found = QueryFirst(a, b, motion_options_);
     } else if (table_.has_motions()) {
-      found = AskPlaced(table_, a, b, query_, motion_options_);
+      found = QueryPlaced(table_, a, b, query_, motion_options_);
     } else {
       found.answer = search_->Ask(a, b, &found.of_body);
       if (!found.answer.ok()) found.answer = NameLimit(found.answer.status(), query_);
@@ -321,10 +321,10 @@ class SceneStream
 
   // Answers a pair of a scene with first_only. The pair counts as separated if it is separated
   // until the earliest known contact.
-  PlacedAnswer AskFirst(uint32_t a, uint32_t b, MotionOptions motion) const {
+  PlacedAnswer QueryFirst(uint32_t a, uint32_t b, MotionOptions motion) const {
     motion.latest = std::min(1.0, ranking_->earliest());
     if (!search_->MayMeet(a, b, motion.latest)) return {Answer()};
-    return AskPlaced(table_, a, b, query_, motion);
+    return QueryPlaced(table_, a, b, query_, motion);
   }
 
   // Ranks a found pair by its separation or, in motion, its first contact. CANCELLED.
@@ -337,7 +337,7 @@ class SceneStream
     if (may_be_near) {
       QueryOptions query = query_;
       query.want_separation = true;
-      found = AskAtRest(table_, a, b, query, nullptr);
+      found = QueryAtRest(table_, a, b, query, nullptr);
     }
     if (absl::IsCancelled(answer.status())) return answer.status();
     const v1::Relation relation =

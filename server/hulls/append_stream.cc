@@ -14,7 +14,7 @@
 #include "hulld/v1/hull.pb.h"
 #include "server/call/queued_stream.h"
 #include "server/call/service_parts.h"
-#include "server/hulls/hull_streams.h"
+#include "server/hulls/hull_service.h"
 #include "server/hulls/in_order.h"
 #include "server/process/random_id.h"
 #include "server/wire/decode.h"

@@ -8,19 +8,12 @@
 #include "hulld/v1/hull.grpc.pb.h"
 #include "server/call/call.h"
 #include "server/call/unary_call.h"
-#include "server/hulls/hull_streams.h"
 #include "server/wire/decode.h"
 #include "server/wire/encode.h"
 #include "server/wire/fresh_answer.h"
 
 namespace hulld::server {
 namespace {
-
-void EncodeBox(const ServedHull& hull, v1::GetHullResponse* response) {
-  if (hull.empty()) return;
-  EncodeVector(hull.low(), response->mutable_box_min());
-  EncodeVector(hull.high(), response->mutable_box_max());
-}
 
 void AddListed(const HullChange& hull, v1::ListHullsResponse& response) {
   v1::HullInfo* info = response.add_hulls();
@@ -120,13 +113,13 @@ class HullService : public HullServiceOfBytes {
     HULLD_RETURN_IF_ERROR(CheckHullId(call.caller(), request.hull_id(), "hull_id"));
     HULLD_ASSIGN_OR_RETURN(const Freshness freshness,
                            DecodeFreshness(request.freshness(), parts_.store, call.arrival()));
-    const auto should_stop = [&call] { return call.ShouldStop(); };
+    const auto should_stop = call.should_stop();
     HULLD_ASSIGN_OR_RETURN(const auto resolved,
                            parts_.registry.Resolve(request.hull_id(), should_stop, freshness));
     const auto& [as_of, view] = resolved;
     EncodeHeader(parts_.store, as_of, response->mutable_header());
     EncodeRecord(view.record, response->mutable_hull());
-    EncodeBox(*view.served, response);
+    EncodeBox(view.served->box(), response);
     const bool wants_properties = request.properties() && !view.served->empty();
     if (request.without_facets() && !request.audit() && !wants_properties) return absl::OkStatus();
     HULLD_ASSIGN_OR_RETURN(const Hull* hull, parts_.registry.reader().Canonical(view, should_stop));

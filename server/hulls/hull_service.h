@@ -5,6 +5,7 @@
 
 #include <memory>
 
+#include "server/call/message_bytes.h"
 #include "server/call/service_parts.h"
 
 namespace hulld::server {
@@ -15,6 +16,13 @@ namespace hulld::server {
 // `writers`. Watches read records on notification, and boxes from the store on `readers`. The parts
 // must outlive the service.
 std::unique_ptr<grpc::Service> MakeHullService(const ServiceParts& parts);
+
+// The streaming calls of the service. Each function starts a call and returns its reactor, which
+// owns itself until gRPC releases it. request, response: owned by gRPC until the call ends.
+BidiReactor* StartAppend(CallContext& context, const ServiceParts& parts);
+ReadReactor* StartReplace(CallContext& context, const ServiceParts& parts, Bytes* response);
+WriteReactor* StartMesh(CallContext& context, const ServiceParts& parts, const Bytes& request);
+WriteReactor* StartWatch(CallContext& context, const ServiceParts& parts, const Bytes& request);
 
 }  // namespace hulld::server
 

@@ -12,7 +12,7 @@
 #include "server/call/pulled_stream.h"
 #include "server/call/service_parts.h"
 #include "server/contract/errors.h"
-#include "server/hulls/hull_streams.h"
+#include "server/hulls/hull_service.h"
 #include "server/settings/config.h"
 #include "server/wire/decode.h"
 #include "server/wire/encode.h"
@@ -48,7 +48,7 @@ class MeshStream : public RequestStream<PulledStream<WriteReactor, v1::GetHullMe
 
   absl::Status MakeHeader() {
     HULLD_RETURN_IF_ERROR(CheckHullId(call().caller(), request().hull_id(), "hull_id"));
-    const auto should_stop = [this] { return call().ShouldStop(); };
+    const auto should_stop = call().should_stop();
     HULLD_ASSIGN_OR_RETURN(const Freshness freshness,
                            DecodeFreshness(request().freshness(), parts_.store, call().arrival()));
     HULLD_ASSIGN_OR_RETURN(const auto resolved,
@@ -70,8 +70,7 @@ class MeshStream : public RequestStream<PulledStream<WriteReactor, v1::GetHullMe
 
   absl::Status Simplify(const v1::Simplification& simplification, v1::MeshHeader* header) {
     const SimplifyTarget target = {static_cast<size_t>(simplification.max_vertices()),
-                                   simplification.max_error(),
-                                   [this] { return call().ShouldStop(); }};
+                                   simplification.max_error(), call().should_stop()};
     const bool is_inside = simplification.side() == v1::SIMPLIFICATION_SIDE_INSIDE;
     if (!is_inside && simplification.side() != v1::SIMPLIFICATION_SIDE_OUTSIDE) {
       return absl::InvalidArgumentError("side must be INSIDE or OUTSIDE");

@@ -12,7 +12,7 @@
 #include "server/call/call_stream.h"
 #include "server/call/service_parts.h"
 #include "server/contract/errors.h"
-#include "server/hulls/hull_streams.h"
+#include "server/hulls/hull_service.h"
 #include "server/wire/decode.h"
 #include "server/wire/encode.h"
 
@@ -96,9 +96,8 @@ class ReplaceStream : public ReadingStream<CallStream<ReadReactor>, v1::ReplaceH
     }
     if (absl::Status s = parts_.registry.CheckMemory(MemoryUse::kWriting); !s.ok())
       return Prefixed(name, s);
-    const absl::StatusOr<PointCounts> added =
-        replacement_.builder->Add(*points, {static_cast<size_t>(limits.max_vertices_per_hull),
-                                            [this] { return call().ShouldStop(); }});
+    const absl::StatusOr<PointCounts> added = replacement_.builder->Add(
+        *points, {static_cast<size_t>(limits.max_vertices_per_hull), call().should_stop()});
     if (absl::IsResourceExhausted(added.status())) {
       return LimitExceeded(name + "the hull would have too many vertices",
                            limits.max_vertices_per_hull, "max-vertices-per-hull");

@@ -13,7 +13,7 @@
 #include "hulld/v1/hull.pb.h"
 #include "server/call/pulled_stream.h"
 #include "server/call/service_parts.h"
-#include "server/hulls/hull_streams.h"
+#include "server/hulls/hull_service.h"
 #include "server/registry/watch/change_feed.h"
 #include "server/wire/encode.h"
 
@@ -50,9 +50,7 @@ void EncodeEvent(const HullChange& change, v1::HullEvent* event) {
     EncodeRecord(change.record, event->mutable_hull());
   }
   event->mutable_hull()->set_damaged(change.damaged);
-  if (change.box.IsEmpty()) return;
-  EncodeVector(change.box.low, event->mutable_box_min());
-  EncodeVector(change.box.high, event->mutable_box_max());
+  EncodeBox(change.box, event);
 }
 
 // A WatchHulls call. Sends one batch of changes after another. If no change is pending, the feed
@@ -97,8 +95,7 @@ class WatchStream : public RequestStream<PulledStream<WriteReactor, v1::WatchHul
       return absl::InvalidArgumentError(
           "after_revision requires store_id; use the one from the same header");
     }
-    HULLD_RETURN_IF_ERROR(
-        parts_.registry.peers().AwaitPeers([this] { return call().ShouldStop(); }));
+    HULLD_RETURN_IF_ERROR(parts_.registry.peers().AwaitPeers(call().should_stop()));
     HULLD_ASSIGN_OR_RETURN(watch_, parts_.registry.feed().Open(
                                        target, {request().after_revision(), request().store_id()},
                                        [this, self = shared_from_this()] { SendNext(); }));
@@ -145,9 +142,8 @@ class WatchStream : public RequestStream<PulledStream<WriteReactor, v1::WatchHul
     loaded.reserve(batch->changes.size());
     for (HullChange& change : batch->changes) {
       if (WantsBox(change)) {
-        const auto resolved = parts_.registry.Resolve(
-            change.record.hull_id, [this] { return call().ShouldStop(); },
-            Freshness::AnyStaleness());
+        const auto resolved = parts_.registry.Resolve(change.record.hull_id, call().should_stop(),
+                                                      Freshness::AnyStaleness());
         const absl::Status& status = resolved.status();
         if (absl::IsNotFound(status)) continue;
         if (!status.ok() && !absl::IsDataLoss(status)) return status;

@@ -26,7 +26,7 @@ class PostgresTarget : public MigrationTarget {
     if (!is_marked) return std::nullopt;
     HULLD_ASSIGN_OR_RETURN(
         const Rows rows,
-        store_->writer().Ask({.text = "SELECT store_id, revision FROM hulld.migration"}));
+        store_->writer().Execute({.text = "SELECT store_id, revision FROM hulld.migration"}));
     if (rows.count() != 1) return absl::DataLossError("the row of hulld.migration is missing");
     return MigrationSource{std::string(rows.at(0, 0)), rows.bigint(0, 1)};
   }
@@ -63,7 +63,7 @@ class PostgresTarget : public MigrationTarget {
     std::vector<Statement> all = {{.text = "BEGIN"}, store_->Fence(revision, added)};
     std::ranges::move(statements, std::back_inserter(all));
     all.push_back({.text = "COMMIT"});
-    absl::Status status = store_->writer().AskToCommit(all).status();
+    absl::Status status = store_->writer().ExecuteCommit(all).status();
     if (status.ok()) return status;
     if (ViolatedConstraint(status) == "store_fence") {
       return absl::AbortedError(

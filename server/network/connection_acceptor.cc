@@ -31,7 +31,7 @@ constexpr int kBacklog = 4096;
 constexpr int kMaxAtOnce = 64;
 // Maximum wait for gRPC to close evicted connections, so that a stuck connection never stops the
 // acceptor.
-constexpr std::chrono::seconds kLongestWait(1);
+constexpr std::chrono::seconds kMaxWait(1);
 // Pause if even the reserve descriptor does not help.
 constexpr int kPauseMilliseconds = 50;
 // As gRPC sets it along with keepalive: a peer that acknowledges nothing for this long is
@@ -198,7 +198,7 @@ void ConnectionAcceptor::Stop() {
 
 bool ConnectionAcceptor::AwaitRoom() {
   std::unique_lock lock(mutex_);
-  room_.wait_for(lock, kLongestWait, [this] { return stopping_ || closing_ < max_closing_; });
+  room_.wait_for(lock, kMaxWait, [this] { return stopping_ || closing_ < max_closing_; });
   return !stopping_;
 }
 

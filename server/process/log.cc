@@ -74,10 +74,10 @@ LineBudget& BudgetOf(const char* library) {
 
 void LogForLibrary(const char* library, spdlog::level::level_enum level, const std::string& text) {
   if (!spdlog::should_log(level)) return;
-  const std::optional<uint64_t> left_out = BudgetOf(library).Spend(LineBudget::Clock::now());
-  if (!left_out.has_value()) return;
-  if (*left_out == 0) return spdlog::log(level, "{}: {}", library, text);
-  spdlog::log(level, "{}: {} ({} earlier lines omitted)", library, text, *left_out);
+  const std::optional<uint64_t> suppressed = BudgetOf(library).Spend(LineBudget::Clock::now());
+  if (!suppressed.has_value()) return;
+  if (*suppressed == 0) return spdlog::log(level, "{}: {}", library, text);
+  spdlog::log(level, "{}: {} ({} earlier lines omitted)", library, text, *suppressed);
 }
 
 void LogForGrpc(gpr_log_func_args* arguments) {
@@ -128,16 +128,16 @@ LogField::LogField(const char* field, double number)
 
 std::optional<uint64_t> LineBudget::Spend(Clock::time_point now) {
   const std::lock_guard lock(mutex_);
-  if (!begin_.has_value() || now - *begin_ >= stretch_) {
+  if (!begin_.has_value() || now - *begin_ >= period_) {
     begin_ = now;
     spent_ = 0;
   }
   if (spent_ == lines_) {
-    ++left_out_;
+    ++suppressed_;
     return std::nullopt;
   }
   ++spent_;
-  return std::exchange(left_out_, 0);
+  return std::exchange(suppressed_, 0);
 }
 
 void RouteLibraryLogs() {

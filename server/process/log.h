@@ -24,7 +24,7 @@ class LineBudget {
  public:
   using Clock = std::chrono::steady_clock;
 
-  LineBudget(int lines, Clock::duration stretch) : lines_(lines), stretch_(stretch) {}
+  LineBudget(int lines, Clock::duration period) : lines_(lines), period_(period) {}
 
   // Returns nullopt if no line may be written at `now`. Otherwise returns the number of lines
   // suppressed since the last one.
@@ -32,11 +32,11 @@ class LineBudget {
 
  private:
   const int lines_;
-  const Clock::duration stretch_;
+  const Clock::duration period_;
   std::mutex mutex_;
   std::optional<Clock::time_point> begin_;
   int spent_ = 0;
-  uint64_t left_out_ = 0;
+  uint64_t suppressed_ = 0;
 };
 
 // Routes the logs of gRPC and protobuf to spdlog's default logger, each within a budget of

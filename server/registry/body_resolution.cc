@@ -146,8 +146,9 @@ std::shared_ptr<const InlineHull> BuildInlineHull(std::span<const Vector> points
       ServedHull(version, box, canonical), MemoryCharge(memory, MemoryUse::kReading, bytes)});
 }
 
-}  // namespace
-
+// Builds the hull of each shape, ready for all queries. Its record has no ID and no revision. It is
+// charged to the readers' share of --memory-limit while a view references it. CANCELLED:
+// should_stop returned true. RESOURCE_EXHAUSTED: readers exceed their share.
 absl::StatusOr<std::vector<HullView>> BuildInlineShapes(Registry& registry,
                                                         const InlineShapes& shapes,
                                                         const std::function<bool()>& should_stop) {
@@ -166,6 +167,8 @@ absl::StatusOr<std::vector<HullView>> BuildInlineShapes(Registry& registry,
   }
   return views;
 }
+
+}  // namespace
 
 bool KnownPlaced::AreBodies(const Bodies& bodies) const {
   return std::ranges::equal(bodies, bodies_, IsSameBody);
@@ -214,53 +217,47 @@ absl::StatusOr<Resolved> ResolvePlaced(Registry& registry, std::span<const std::
                                        const PlacedLookup& lookup,
                                        const std::function<bool()>& should_stop) {
   KnownPlaced known(/*for_one_lookup=*/true);
-  return RefreshPlaced(registry, ids, known, lookup, should_stop);
+  return known.Resolve(registry, ids, lookup, should_stop);
 }
 
 // Looks up the bodies before and after the hulls. If both lookups agree, the bodies were current
 // throughout, including at the revision of the hulls.
-absl::StatusOr<Resolved> RefreshPlaced(Registry& registry, std::span<const std::string> ids,
-                                       KnownPlaced& known, const PlacedLookup& lookup,
-                                       const std::function<bool()>& should_stop) {
+absl::StatusOr<Resolved> KnownPlaced::Resolve(Registry& registry, std::span<const std::string> ids,
+                                              const PlacedLookup& lookup,
+                                              const std::function<bool()>& should_stop) {
   const bool may_wait = lookup.plan.may_wait;
-  if (lookup.shapes != nullptr && !lookup.shapes->empty() && known.shapes_.empty()) {
+  if (lookup.shapes != nullptr && !lookup.shapes->empty() && shapes_.empty()) {
     if (!may_wait) return WouldWait();
-    HULLD_ASSIGN_OR_RETURN(known.shapes_, BuildInlineShapes(registry, *lookup.shapes, should_stop));
+    HULLD_ASSIGN_OR_RETURN(shapes_, BuildInlineShapes(registry, *lookup.shapes, should_stop));
   }
   absl::StatusOr<Bodies> bodies = BodiesAmong(registry, ids, should_stop, may_wait);
   absl::StatusOr<Resolved> hulls;
   do {
     if (!bodies.ok()) return bodies.status();
-    known.SetBodies(ids, *std::move(bodies));
-    hulls = registry.reader().Refresh(
-        known.has_bodies() ? std::span<const std::string>(known.hull_ids_) : ids, known.hulls_,
-        should_stop, PlanOf(lookup));
+    SetBodies(ids, *std::move(bodies));
+    hulls = registry.reader().Refresh(has_bodies() ? std::span<const std::string>(hull_ids_) : ids,
+                                      hulls_, should_stop, PlanOf(lookup));
     if (!hulls.ok()) return hulls;
     bodies = BodiesAmong(registry, ids, should_stop, may_wait);
-  } while (!bodies.ok() || !known.AreBodies(*bodies));
+  } while (!bodies.ok() || !AreBodies(*bodies));
   // The resolved snapshots are immutable, so building may take long.
   if (lookup.canonical) {
     HULLD_RETURN_IF_ERROR(MakeCanonical(registry, should_stop, may_wait, hulls->hulls));
   }
-  const auto add_shapes = [&known](std::vector<absl::StatusOr<HullView>>& to) {
-    to.insert(to.end(), known.shapes_.begin(), known.shapes_.end());
-  };
-  if (!known.has_bodies()) {
-    add_shapes(hulls->hulls);
-    return hulls;
+  if (has_bodies()) {
+    const auto find_hull = [&](const std::string& id) -> const absl::StatusOr<HullView>& {
+      return hulls->hulls[index_of_.at(id)];
+    };
+    std::vector<absl::StatusOr<HullView>> placed;
+    placed.reserve(ids.size());
+    for (size_t i = 0; i < ids.size(); ++i) {
+      placed.push_back(bodies_[i] == nullptr ? find_hull(ids[i])
+                                             : ServeBody(registry, bodies_[i], lookup, find_hull));
+    }
+    hulls->hulls = std::move(placed);
   }
-  const auto find_hull = [&](const std::string& id) -> const absl::StatusOr<HullView>& {
-    return hulls->hulls[known.index_of_.at(id)];
-  };
-  Resolved resolved = {.as_of = hulls->as_of};
-  resolved.hulls.reserve(ids.size());
-  for (size_t i = 0; i < ids.size(); ++i) {
-    resolved.hulls.push_back(known.bodies_[i] == nullptr
-                                 ? find_hull(ids[i])
-                                 : ServeBody(registry, known.bodies_[i], lookup, find_hull));
-  }
-  add_shapes(resolved.hulls);
-  return resolved;
+  hulls->hulls.insert(hulls->hulls.end(), shapes_.begin(), shapes_.end());
+  return hulls;
 }
 
 }  // namespace hulld::server

@@ -43,14 +43,6 @@ class InlineShapes {
   std::vector<size_t> ends_;
 };
 
-// Builds the hull of each shape, ready for all queries. Its record has no ID and no revision. It is
-// charged to the readers' share of --memory-limit while a view references it. CANCELLED:
-// should_stop returned true. RESOURCE_EXHAUSTED: readers exceed their share, and the hulls need
-// more than a few hundred KiB. Cost: building the hulls.
-absl::StatusOr<std::vector<HullView>> BuildInlineShapes(Registry& registry,
-                                                        const InlineShapes& shapes,
-                                                        const std::function<bool()>& should_stop);
-
 // Options of a lookup of hulls and bodies for queries.
 struct PlacedLookup {
   // True if the answers name vertices (QueryOptions::WantsCanonical).
@@ -63,20 +55,22 @@ struct PlacedLookup {
   const InlineShapes* shapes = nullptr;
 };
 
-// State that a reader keeps between repeated lookups of the same IDs. Not thread-safe.
+// Resolves the same hulls and bodies repeatedly. Not thread-safe.
 class KnownPlaced {
  public:
   // for_one_lookup: as for KnownHulls.
   explicit KnownPlaced(bool for_one_lookup = false) : hulls_(for_one_lookup) {}
 
+  // Like ResolvePlaced, but looks up only hulls that changed since the previous call. Requires the
+  // IDs of the first call. The points of inline shapes are not needed after it.
+  absl::StatusOr<Resolved> Resolve(Registry& registry, std::span<const std::string> ids,
+                                   const PlacedLookup& lookup,
+                                   const std::function<bool()>& should_stop);
+
   // Bytes used for bodies. Hulls use KnownHulls::kBytesEach per ID.
   size_t BodyBytes() const;
 
  private:
-  friend absl::StatusOr<Resolved> RefreshPlaced(Registry&, std::span<const std::string>,
-                                                KnownPlaced&, const PlacedLookup&,
-                                                const std::function<bool()>&);
-
   using Bodies = std::vector<std::shared_ptr<const Body>>;
 
   // Returns true if `bodies` equals the previous bodies, at the same revisions.
@@ -105,13 +99,6 @@ class KnownPlaced {
 // returned true.
 absl::StatusOr<Resolved> ResolvePlaced(Registry& registry, std::span<const std::string> ids,
                                        const PlacedLookup& lookup,
-                                       const std::function<bool()>& should_stop);
-
-// Like ResolvePlaced, for a reader that repeatedly resolves the same IDs: `known` persists between
-// calls, and only hulls changed since are looked up. The points of inline shapes are not needed
-// after the first call.
-absl::StatusOr<Resolved> RefreshPlaced(Registry& registry, std::span<const std::string> ids,
-                                       KnownPlaced& known, const PlacedLookup& lookup,
                                        const std::function<bool()>& should_stop);
 
 // PERMISSION_DENIED, naming the piece: the hull of a piece is outside the caller's prefix.

@@ -39,23 +39,31 @@ Registry::~Registry() {
 absl::Status Registry::Load() {
   Locked locked(state_.mutex);
   Store& store = state_.store;
-  state_.Begin(store.revision(), records_);
+  state_.feed.Begin(store.revision(), records_);
+  StoreTotals totals;
   if (state_.is_cache()) {
-    state_.SetTotals(store.totals());
+    totals = store.totals();
   } else {
     HULLD_RETURN_IF_ERROR(
         store.ForEachHull([&](const std::string& id, const absl::StatusOr<StoredHull>& stored) {
           state_.AddStored(id, stored);
+          if (stored.ok()) totals.vertices += stored->record.vertex_count;
         }));
     if (state_.statistics.damaged > 0) {
       spdlog::error("{} of {} hulls are damaged", state_.statistics.damaged, state_.hulls.size());
     }
     HULLD_RETURN_IF_ERROR(
         store.ForEachBody([&](const std::string& id, const absl::StatusOr<StoredBody>& body) {
-          state_.AddStoredBody(locked, id, body);
+          state_.AddBody(locked, id, body);
         }));
+    totals.hulls = state_.hulls.size();
+    totals.bodies = state_.bodies.size();
   }
-  return peers_.Begin(locked, {&changes_, &records_});
+  state_.SetTotals(totals);
+  return peers_.Begin(locked, [this](const std::string& id, const HullPointer& hull) {
+    if (hull != nullptr) changes_.DeferAdvance(hull);
+    records_.OnPeerChange(id);
+  });
 }
 
 absl::StatusOr<Resolved> Registry::Resolve(std::span<const std::string> ids,

@@ -72,11 +72,11 @@ void WaitingCalls::Run() {
     changed_.wait(lock, [this] { return ending_ || !waits_.empty(); });
     changed_.wait_for(lock, kStopPoll, [this] { return ending_; });
     if (ending_) return;
-    std::vector<std::shared_ptr<Wait>> looked_at = std::exchange(waits_, {});
+    std::vector<std::shared_ptr<Wait>> polled = std::exchange(waits_, {});
     lock.unlock();
-    std::erase_if(looked_at, [](const auto& wait) { return !wait->EndIfStopped(); });
+    std::erase_if(polled, [](const auto& wait) { return !wait->EndIfStopped(); });
     lock.lock();
-    std::move(looked_at.begin(), looked_at.end(), std::back_inserter(waits_));
+    std::move(polled.begin(), polled.end(), std::back_inserter(waits_));
   }
 }
 

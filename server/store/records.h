@@ -102,6 +102,17 @@ struct StoredBody {
   }
 };
 
+// A hull or body from its creation or replacement to its end.
+struct Incarnation {
+  static Incarnation Of(const HullRecord& record) { return {record.create_revision, false}; }
+  static Incarnation Of(const BodyRecord& record) { return {record.create_revision, true}; }
+
+  uint64_t create_revision = 0;
+  bool is_body = false;
+
+  bool operator==(const Incarnation&) const = default;
+};
+
 }  // namespace hulld::server
 
 #endif  // HULLD_SERVER_STORE_RECORDS_H_

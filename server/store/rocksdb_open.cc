@@ -65,7 +65,8 @@ absl::StatusOr<std::unique_ptr<RocksDbStore>> RocksDbStore::Open(RocksDbOptions 
   if (read_only) return store;
   ClearScratch(store->options_.data_dir);
   HULLD_RETURN_IF_ERROR(store->StartMark());
-  store->syncer_ = std::thread([raw = store.get()] { raw->SyncAtIntervals(); });
+  store->syncs_.emplace(store->options_.sync_interval,
+                        [raw = store.get()] { raw->SyncInBackground(); });
   return store;
 }
 
@@ -84,12 +85,7 @@ RocksDbStore::RocksDbStore(RocksDbOptions options)
 }
 
 RocksDbStore::~RocksDbStore() {
-  {
-    const std::lock_guard lock(sync_mutex_);
-    ending_ = true;
-  }
-  sync_wake_.notify_all();
-  if (syncer_.joinable()) syncer_.join();
+  syncs_.reset();
   if (relaxed_run_ && db_ != nullptr) EndRelaxedRun().IgnoreError();
   // Retries to cut off the remains of a failed write.
   db_ = nullptr;

@@ -334,14 +334,9 @@ absl::Status RocksDbStore::SyncLog() {
   return failure_;
 }
 
-void RocksDbStore::SyncAtIntervals() {
-  std::unique_lock lock(sync_mutex_);
-  while (!sync_wake_.wait_for(lock, options_.sync_interval, [this] { return ending_; })) {
-    lock.unlock();
-    if (options_.durability == Durability::kRelaxed) SyncLog().IgnoreError();
-    files_->SyncMark().PermitUncheckedError();
-    lock.lock();
-  }
+void RocksDbStore::SyncInBackground() {
+  if (options_.durability == Durability::kRelaxed) SyncLog().IgnoreError();
+  files_->SyncMark().PermitUncheckedError();
 }
 
 }  // namespace hulld::server

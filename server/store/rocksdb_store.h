@@ -8,7 +8,6 @@
 
 #include <atomic>
 #include <chrono>
-#include <condition_variable>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -18,9 +17,9 @@
 #include <span>
 #include <string>
 #include <string_view>
-#include <thread>
 #include <vector>
 
+#include "server/process/periodic_task.h"
 #include "server/store/files/disk_reserve.h"
 #include "server/store/files/log_file_system.h"
 #include "server/store/store.h"
@@ -175,7 +174,7 @@ class RocksDbStore : public Store {
   absl::Status Probe();
   absl::Status Reopen();
   absl::Status SyncLog();
-  void SyncAtIntervals();
+  void SyncInBackground();
 
   const RocksDbOptions options_;
   std::shared_ptr<LogFileSystem> files_;
@@ -207,10 +206,8 @@ class RocksDbStore : public Store {
   std::atomic<uint64_t> sync_failures_ = 0;
   std::atomic<uint64_t> read_failures_ = 0;
 
-  std::mutex sync_mutex_;
-  std::condition_variable sync_wake_;
-  bool ending_ = false;
-  std::thread syncer_;
+  // Calls SyncInBackground unless the store is read-only.
+  std::optional<PeriodicTask> syncs_;
 };
 
 }  // namespace hulld::server

@@ -87,10 +87,8 @@ struct PeerChange {
   uint64_t revision = 0;
   // Revision at which the latest incarnation ended; 0: none ended.
   uint64_t ended_at = 0;
-  // create_revision of the first incarnation that ended, or 0 if none ended or it is unknown; and
-  // its kind.
-  uint64_t former_began = 0;
-  bool former_was_body = false;
+  // First incarnation that ended; nullopt if none ended or it is unknown.
+  std::optional<Incarnation> former;
   // The current hull or body, if any. DATA_LOSS: it is damaged.
   std::optional<absl::StatusOr<StoredHull>> hull;
   std::optional<absl::StatusOr<StoredBody>> body;

@@ -13,7 +13,7 @@ namespace hulld::server {
 namespace {
 
 // Returns true if the disk is full, even if only the text of the system's error reports it.
-bool SaysDiskFull(const rocksdb::Status& status) {
+bool ReportsFullDisk(const rocksdb::Status& status) {
   const std::string cause = status.ToString();
   return status.IsNoSpace() || absl::StrContains(cause, std::strerror(ENOSPC)) ||
          absl::StrContains(cause, std::strerror(EDQUOT));
@@ -33,7 +33,7 @@ bool IsDiskFull(const absl::Status& status) { return absl::IsResourceExhausted(s
 
 absl::Status WriteError(const rocksdb::Status& status, const std::string& data_dir) {
   const std::string cause = status.ToString();
-  if (SaysDiskFull(status)) return DiskFull(cause, data_dir);
+  if (ReportsFullDisk(status)) return DiskFull(cause, data_dir);
   return absl::UnavailableError(
       absl::StrCat("cannot write to --data-dir ", data_dir, " (", cause,
                    "); nothing was changed; fix the cause, then retry; no restart is needed"));
@@ -70,7 +70,7 @@ absl::Status OpenError(const rocksdb::Status& status, const std::string& data_di
     return absl::NotFoundError(
         absl::StrCat("--data-dir ", data_dir, " contains no hulld store (", cause, ")"));
   }
-  if (SaysDiskFull(status)) return DiskFull(cause, data_dir);
+  if (ReportsFullDisk(status)) return DiskFull(cause, data_dir);
   return absl::UnavailableError(
       absl::StrCat("cannot open the store in --data-dir ", data_dir, ": ", cause));
 }

@@ -1,6 +1,7 @@
 #include "server/wire/encode.h"
 
 #include <absl/strings/str_cat.h>
+#include <google/protobuf/util/time_util.h>
 
 #include <array>
 #include <variant>
@@ -129,8 +130,7 @@ void EncodeVersion(const Store& store, const HullRecord& record, v1::HullVersion
 }
 
 void EncodeDuration(std::chrono::nanoseconds duration, google::protobuf::Duration* message) {
-  message->set_seconds(duration.count() / 1'000'000'000);
-  message->set_nanos(static_cast<int32_t>(duration.count() % 1'000'000'000));
+  *message = google::protobuf::util::TimeUtil::NanosecondsToDuration(duration.count());
 }
 
 // The arrays of the next functions are in the order of the encoded enums.

@@ -21,6 +21,13 @@
 namespace hulld::server {
 
 void EncodeVector(const Vector& vector, v1::Vector3* message);
+// Encodes a box into box_min and box_max of the message. Omits an empty one.
+template <typename Message>
+void EncodeBox(const Box& box, Message* message) {
+  if (box.IsEmpty()) return;
+  EncodeVector(box.low, message->mutable_box_min());
+  EncodeVector(box.high, message->mutable_box_max());
+}
 void EncodeCounts(const PointCounts& counts, v1::PointCounts* message);
 void EncodeHeader(const Store& store, uint64_t revision, v1::ResponseHeader* message);
 // Adds the revision and staleness of a read.

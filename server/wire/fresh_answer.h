@@ -39,7 +39,7 @@ void EndFresh(Registry& registry, TaskPool& pool, UnaryCall* call, Answer answer
   }
   call->EndOn(pool, [&registry, call, freshness = *freshness, answer = std::move(answer)] {
     const absl::StatusOr<std::chrono::nanoseconds> staleness =
-        registry.peers().AwaitFresh(freshness, [call] { return call->call().ShouldStop(); });
+        registry.peers().AwaitFresh(freshness, call->call().should_stop());
     return staleness.ok() ? answer(*staleness) : staleness.status();
   });
 }
@@ -56,11 +56,11 @@ void EndListed(Registry& registry, TaskPool& pool, UnaryCall* call, Rpc rpc, Rec
                            PrefixToList(call->call().caller(), request.prefix()));
     HULLD_ASSIGN_OR_RETURN(const std::string after,
                            DecodePageToken(rpc, request.page_token(), prefix));
-    const uint32_t asked =
+    const uint32_t page_size =
         request.page_size() == 0 ? Config::kDefaultPageSize : request.page_size();
-    const absl::StatusOr<RecordPage> page = registry.records().List(
-        prefix, after, std::min(asked, Config::kMaxPageSize),
-        [call] { return call->call().ShouldStop(); }, kinds);
+    const absl::StatusOr<RecordPage> page =
+        registry.records().List(prefix, after, std::min(page_size, Config::kMaxPageSize),
+                                call->call().should_stop(), kinds);
     if (!page.ok()) return page.status();
     EncodeHeader(registry.store(), AsOf{page->store_revision, staleness},
                  call->response().mutable_header());

@@ -25,8 +25,8 @@ bool HasBody(const PlacementTable& table, uint32_t a, uint32_t b) {
   return table.is_body(a) || table.is_body(b);
 }
 
-absl::StatusOr<Answer> AskHulls(const PlacementTable& table, uint32_t a, uint32_t b,
-                                const QueryOptions& options, PairCache* cache) {
+absl::StatusOr<Answer> QueryHulls(const PlacementTable& table, uint32_t a, uint32_t b,
+                                  const QueryOptions& options, PairCache* cache) {
   std::optional<PlacedHull> made_a;
   std::optional<PlacedHull> made_b;
   return CheckCollision(table.PlacedAt(a, &made_a), table.PlacedAt(b, &made_b), options, cache);
@@ -129,7 +129,7 @@ absl::StatusOr<bool> PairSearch::Begin() {
         search_, TextbookCheck::Begin(table_.placed()[a_], table_.placed()[b_], options_));
     return false;
   }
-  answer_.answer = AskHulls(table_, a_, b_, options_, nullptr);
+  answer_.answer = QueryHulls(table_, a_, b_, options_, nullptr);
   return true;
 }
 
@@ -168,18 +168,18 @@ size_t PairSearch::MemoryBytes() const {
   return check == nullptr ? 0 : check->MemoryBytes();
 }
 
-PlacedAnswer AskPlaced(const PlacementTable& table, uint32_t a, uint32_t b,
-                       const QueryOptions& options, const MotionOptions& motion) {
+PlacedAnswer QueryPlaced(const PlacementTable& table, uint32_t a, uint32_t b,
+                         const QueryOptions& options, const MotionOptions& motion) {
   PairSearch search(table, a, b, options, motion);
   while (!search.Advance(PairSearch::Clock::time_point::max())) continue;
   return std::move(search.answer());
 }
 
-PlacedAnswer AskAtRest(const PlacementTable& table, uint32_t a, uint32_t b,
-                       const QueryOptions& options, PairCache* cache) {
+PlacedAnswer QueryAtRest(const PlacementTable& table, uint32_t a, uint32_t b,
+                         const QueryOptions& options, PairCache* cache) {
   static const auto* const kNoMotion = new MotionOptions();
-  if (HasBody(table, a, b)) return AskPlaced(table, a, b, options, *kNoMotion);
-  PlacedAnswer found = {AskHulls(table, a, b, options, cache)};
+  if (HasBody(table, a, b)) return QueryPlaced(table, a, b, options, *kNoMotion);
+  PlacedAnswer found = {QueryHulls(table, a, b, options, cache)};
   if (!found.answer.ok()) found.answer = NameLimit(found.answer.status(), options);
   return found;
 }

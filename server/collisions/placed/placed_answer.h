@@ -92,12 +92,12 @@ class PairSearch {
 };
 
 // Runs a complete search.
-PlacedAnswer AskPlaced(const PlacementTable& table, uint32_t a, uint32_t b,
-                       const QueryOptions& options, const MotionOptions& motion);
+PlacedAnswer QueryPlaced(const PlacementTable& table, uint32_t a, uint32_t b,
+                         const QueryOptions& options, const MotionOptions& motion);
 
-// Like AskPlaced, for a call without motions. cache: for a pair of hulls; may be null.
-PlacedAnswer AskAtRest(const PlacementTable& table, uint32_t a, uint32_t b,
-                       const QueryOptions& options, PairCache* cache);
+// Like QueryPlaced, for a call without motions. cache: for a pair of hulls; may be null.
+PlacedAnswer QueryAtRest(const PlacementTable& table, uint32_t a, uint32_t b,
+                         const QueryOptions& options, PairCache* cache);
 
 // Adds the certificates of pairs of pieces until they exceed `most` bytes. Returns the bytes added.
 size_t AddCertificates(const PlacementTable& table, uint32_t a, uint32_t b,

@@ -329,9 +329,8 @@ absl::Status PlacementTable::Refresh(Registry& registry, const QueryOptions& opt
 
 absl::Status PlacementTable::ResolveFrom(Registry& registry, KnownPlaced& known,
                                          const QueryOptions& options, const ReadPlan& plan) {
-  HULLD_ASSIGN_OR_RETURN(
-      Resolved resolved,
-      RefreshPlaced(registry, ids_, known, LookupFor(options, plan), options.should_stop));
+  HULLD_ASSIGN_OR_RETURN(Resolved resolved, known.Resolve(registry, ids_, LookupFor(options, plan),
+                                                          options.should_stop));
   SetHulls(registry.store(), std::move(resolved), options);
   return absl::OkStatus();
 }

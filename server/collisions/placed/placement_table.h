@@ -282,6 +282,8 @@ absl::Status CheckOrder(const Request& request, bool is_open, const char* twice)
 // or a pose is malformed.
 absl::Status ValidateMoves(const google::protobuf::RepeatedField<uint32_t>& placements,
                            const google::protobuf::RepeatedField<double>& poses, size_t count);
+// Validating an update with at most this many poses takes less than a slice.
+inline constexpr int kMaxShortUpdate = 4096;
 
 // Returns an error text that states the number of placements. It fits both forms of a request,
 // because it names no field that the caller may not have sent.

@@ -30,7 +30,7 @@ absl::Status ValidateForMotions(const QueryOptions& options);
 
 // Returns true if only relations are wanted and all placements are hulls at rest: the most frequent
 // kind of call, which has a separate path.
-inline bool AsksRelationsOfHulls(const QueryOptions& options, const PlacementTable& table) {
+inline bool WantsRelationsOfHulls(const QueryOptions& options, const PlacementTable& table) {
   return options.WantsRelationOnly() && !table.has_bodies() && !table.has_motions();
 }
 

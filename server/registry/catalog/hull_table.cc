@@ -21,7 +21,7 @@ HullRecord HullTable::RestingHull::RecordWith(const std::string& id) const {
   record.hull_id = id;
   record.create_revision = create_revision;
   record.revision = revision;
-  // NOLINTNEXTLINE(bugprone-signed-char-misuse): -1 is that of no points
+  // NOLINTNEXTLINE(bugprone-signed-char-misuse): -1 stands for no points
   record.dimension = dimension;
   record.vertex_count = vertex_count;
   record.counts = counts;
@@ -67,7 +67,7 @@ bool HullTable::contains(const std::string& id) const {
   return found != index_.end() && !(*found)->second.is_absent_;
 }
 
-std::optional<HullPointer> HullTable::Ask(const std::string& id) {
+std::optional<HullPointer> HullTable::LookUp(const std::string& id) {
   const auto found = index_.find(id);
   if (found == index_.end()) return is_cache() ? std::nullopt : std::optional<HullPointer>(nullptr);
   Entry& entry = (*found)->second;
@@ -117,7 +117,6 @@ HullTable::Entry& HullTable::Add(const std::string& id) {
   const auto [place, is_new] = AddEntry(id);
   HULLD_CHECK(is_new || place->second.is_absent_);
   place->second.is_absent_ = false;
-  ++size_;
   return place->second;
 }
 
@@ -151,7 +150,6 @@ void HullTable::Insert(const HullPointer& hull) {
 void HullTable::Erase(const HullPointer& hull) {
   const auto found = index_.find(hull->committed().record.hull_id);
   HULLD_CHECK(found != index_.end() && (*found)->second.awake_ == hull);
-  --size_;
   if (!is_cache()) return EraseEntry(*found);
   Entry& entry = (*found)->second;
   ExchangeCompact(entry, nullptr);
@@ -228,14 +226,13 @@ void HullTable::RestSome(Locked& locked) {
       return;
     }
     if (i + 1 == kHullsPerStep) hand_ = next->first;
-    const auto looked_at = next++;
-    Entry& entry = looked_at->second;
+    const auto visited = next++;
+    Entry& entry = visited->second;
     if (entry.awake_ != nullptr) {
       if (!entry.awake_->IsAtRest() || !RestCompact(locked, entry)) continue;
     }
     if (!is_cache() || entries_.size() <= *most_ || std::exchange(entry.is_used_, false)) continue;
-    if (!entry.is_absent_) --size_;
-    EraseEntry(looked_at);
+    EraseEntry(visited);
   }
 }
 

@@ -4,7 +4,6 @@
 #include <absl/container/flat_hash_set.h>
 #include <absl/hash/hash.h>
 
-#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
@@ -119,8 +118,8 @@ class HullTable {
   };
   using Entries = std::map<std::string, Entry>;
 
-  // Number of hulls in memory. Any thread may call this.
-  size_t size() const { return size_.load(std::memory_order_relaxed); }
+  // Number of entries: unless this is a cache, of hulls.
+  size_t size() const { return entries_.size(); }
   bool contains(const std::string& id) const;
   // Returns true if the ID's state is known, including absence. Unless this is a cache, an ID
   // without an entry is absent.
@@ -130,11 +129,11 @@ class HullTable {
 
   // Returns the hull and wakes it if it is at rest; null if it is absent; nullopt if it is unknown.
   // Cost: O(1), plus restoring the points of a small hull.
-  std::optional<HullPointer> Ask(const std::string& id);
-  // Prefetches the index entry of an ID that Ask or Find will look up.
+  std::optional<HullPointer> LookUp(const std::string& id);
+  // Prefetches the index entry of an ID that LookUp or Find will look up.
   void Prefetch(const std::string& id) const { index_.prefetch(id); }
-  // Like Ask, but returns null for an unknown ID.
-  HullPointer Find(const std::string& id) { return Ask(id).value_or(nullptr); }
+  // Like LookUp, but returns null for an unknown ID.
+  HullPointer Find(const std::string& id) { return LookUp(id).value_or(nullptr); }
   // Adds a stored hull, at rest. Requires: no hull has its ID.
   void AddResting(const StoredHull& stored);
   // Records that the ID is absent. Requires: the ID is unknown.
@@ -197,8 +196,6 @@ class HullTable {
   Entries entries_;
   // All entries, for lookups. A search of the ordered map takes about 2 us with a million entries.
   absl::flat_hash_set<Place, HashOfId, EqualIds> index_;
-  // Number of entries that are hulls.
-  std::atomic<size_t> size_ = 0;
   // Limit in records; set if this is a cache.
   std::optional<size_t> most_;
   // ID of the last hull that RestSome visited, and of the last one that DropCompact visited.

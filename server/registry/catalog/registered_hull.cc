@@ -43,20 +43,21 @@ void RegisteredHull::SetCommittedMark(Locked& locked, const LiveHull::Mark& mark
   if (const Box box = BoxAt(mark); !box.IsEmpty()) committed_.box = box;
 }
 
-void RegisteredHull::Commit(Locked& locked, const StoredHull& stored, const LiveHull::Mark& mark,
-                            const WriterSequence& writer, uint64_t points) {
-  const bool is_changed = stored.record.revision != committed().record.revision;
-  committed_.stored = stored;
-  *in_flight_.revisions = RevisionsOf(stored);
+void RegisteredHull::Commit(Locked& locked, const Change& chunk, const LiveHull::Mark& mark,
+                            uint64_t points) {
+  const bool is_changed = chunk.hull.record.revision != committed().record.revision;
+  committed_.stored = chunk.hull;
+  *in_flight_.revisions = RevisionsOf(chunk.hull);
   SetRevisions(*in_flight_.revisions, &in_flight_.head);
   SetCommittedMark(locked, mark);
   if (is_changed) {
     DiscardServed(locked);
     DiscardCanonical(locked);
   }
-  Sequences& sequences = in_flight_.writers[writer.writer_id];
-  HULLD_CHECK(writer.sequence == sequences.committed + 1 && writer.sequence <= sequences.head);
-  sequences.committed = writer.sequence;
+  const uint64_t sequence = chunk.writer->sequence;
+  Sequences& sequences = in_flight_.writers[chunk.writer->writer_id];
+  HULLD_CHECK(sequence == sequences.committed + 1 && sequence <= sequences.head);
+  sequences.committed = sequence;
   served_.points_since_prepared += points;
   NoteUse();
 }
@@ -234,14 +235,14 @@ std::shared_ptr<const ServedHull> RegisteredHull::Serve() {
     served_.version =
         std::make_shared<const ServedHull>(live()->VersionAt(mark), BoxAt(mark), served_.canonical);
   }
-  std::shared_ptr<const Reading> reading = served_.readers.lock();
+  std::shared_ptr<const PinnedVersion> pinned = served_.readers.lock();
   if (is_new) CountParts();
-  if (reading == nullptr) {
-    reading = std::make_shared<const Reading>(account.parts(), served_.version);
-    served_.readers = reading;
+  if (pinned == nullptr) {
+    pinned = std::make_shared<const PinnedVersion>(account.parts(), served_.version);
+    served_.readers = pinned;
   }
-  const ServedHull* const shown = reading->served.get();
-  return {std::move(reading), shown};
+  const ServedHull* const shown = pinned->served.get();
+  return {std::move(pinned), shown};
 }
 
 void RegisteredHull::Prefetch() const {

@@ -89,10 +89,9 @@ class RegisteredHull {
   void SetStored(const StoredHull& stored);
   // Restores the bounding box of a hull that was at rest.
   void SetBox(const Box& box) { committed_.box = box; }
-  // Commits the oldest chunk in flight, with `points` new vertices. mark: the prefix of live() that
-  // includes it.
-  void Commit(Locked& locked, const StoredHull& stored, const LiveHull::Mark& mark,
-              const WriterSequence& writer, uint64_t points);
+  // Commits the oldest chunk in flight. mark: the prefix of live() that includes it. points: number
+  // of its points that became vertices.
+  void Commit(Locked& locked, const Change& chunk, const LiveHull::Mark& mark, uint64_t points);
   // True if a peer server's `stored` is the committed hull plus a few points, all of them in
   // deltas, so that adding them to live() costs less than reloading the hull.
   bool GrewInto(const StoredHull& stored) const;
@@ -218,8 +217,9 @@ class RegisteredHull {
     uint64_t head = 0;
   };
   // A served version while a reader holds it. Its memory counts until it is freed.
-  struct Reading {
-    Reading(std::shared_ptr<const MemoryParts> parts, std::shared_ptr<const ServedHull> served_hull)
+  struct PinnedVersion {
+    PinnedVersion(std::shared_ptr<const MemoryParts> parts,
+                  std::shared_ptr<const ServedHull> served_hull)
         : pin(std::move(parts)), served(std::move(served_hull)) {}
     const MemoryPin pin;
     const std::shared_ptr<const ServedHull> served;
@@ -264,7 +264,7 @@ class RegisteredHull {
     // Sum of the account's parts when they were last counted.
     uint64_t shared_bytes = 0;
     // Readers' reference to `version`.
-    std::weak_ptr<const Reading> readers;
+    std::weak_ptr<const PinnedVersion> readers;
   };
 
   void SetCommittedMark(Locked& locked, const LiveHull::Mark& mark);

@@ -108,10 +108,28 @@ struct Replacement {
 // A body at one revision, shared by readers.
 class Body;
 
+// Kind of change of a hull, as v1::HullEventKind.
+enum class ChangeKind { kPresent, kCreated, kChanged, kReplaced, kDeleted };
+
+// A hull or body as lists and replies describe it, or its net change since the last notification of
+// a watch.
+struct HullChange {
+  ChangeKind kind = ChangeKind::kPresent;
+  // kDeleted: only the ID, and the revision of the deletion. For a body: ID and revisions.
+  HullRecord record;
+  bool is_body = false;
+  // For a body.
+  uint64_t piece_count = 0;
+  // True if the store cannot read it.
+  bool damaged = false;
+  // The bounding box. Empty if the hull has no vertices, or has not been in memory since the server
+  // started.
+  Box box = Box::Empty();
+};
+
 struct PutBodyResult {
   uint64_t store_revision = 0;
-  BodyRecord body;
-  uint64_t piece_count = 0;
+  HullChange body;
   // True if no body existed before.
   bool created = false;
 };
@@ -184,24 +202,6 @@ struct OpenResult {
   AppendSession session;
   HullRecord hull;
   uint64_t last_sequence = 0;
-};
-
-// Kind of change of a hull, as v1::HullEventKind.
-enum class ChangeKind { kPresent, kCreated, kChanged, kReplaced, kDeleted };
-
-// Net change of a hull or body since the watch's last notification.
-struct HullChange {
-  ChangeKind kind = ChangeKind::kPresent;
-  // kDeleted: only the ID, and the revision of the deletion. For a body: ID and revisions.
-  HullRecord record;
-  bool is_body = false;
-  // For a body.
-  uint64_t piece_count = 0;
-  // True if the store cannot read it.
-  bool damaged = false;
-  // The bounding box. Empty if the hull has no vertices, or has not been in memory since the server
-  // started.
-  Box box = Box::Empty();
 };
 
 // Called exactly once with the result.

@@ -112,11 +112,9 @@ void LocalChanges::OpenNew(Locked& locked, const std::shared_ptr<OpenRequest>& r
   if (!request->create_if_absent) {
     return Answer(locked, request->done, state_.NoSuchHull(request->hull_id));
   }
-  CreateNew(locked, request->hull_id,
-            [=, this](Locked& later, const absl::StatusOr<HullPointer>& created) {
-              if (Committer::IsSuperseded(created.status())) return later.AfterwardsLocked(again);
-              if (!created.ok()) return Answer(later, request->done, created.status());
-              OpenSession(later, *created, *request, true, 0);
+  CreateNew(locked, request->hull_id, request->done, again,
+            [=, this](Locked& later, const HullPointer& created) {
+              OpenSession(later, created, *request, true, 0);
             });
 }
 
@@ -303,7 +301,7 @@ absl::StatusOr<LocalChanges::BuiltChunk> LocalChanges::Build(Locked& locked, Reg
   hull.state.StartBuilding();
   const absl::StatusOr<std::shared_ptr<LiveHull>> live = LiveForWriter(locked, hull);
   if (Committer::IsSuperseded(live.status())) return live.status();
-  if (!live.ok()) return WhyNotBuilt(hull, live.status());
+  if (!live.ok()) return BuildFailure(hull, live.status());
   BuiltChunk built;
   Change& change = built.change;
   change.hull = hull.head();
@@ -323,7 +321,7 @@ absl::StatusOr<LocalChanges::BuiltChunk> LocalChanges::Build(Locked& locked, Reg
     if (peers_.has_peers()) return Superseded();
     return absl::UnavailableError("an earlier change could not be stored");
   }
-  if (!added.ok()) return WhyNotBuilt(hull, added.status());
+  if (!added.ok()) return BuildFailure(hull, added.status());
   if (hull.state.damaged()) {
     hull.DiscardBuilder(locked);
     return hull.state.damage();
@@ -401,7 +399,7 @@ absl::StatusOr<PointCounts> LocalChanges::AddPoints(PendingChunk& pending, LentB
 }
 
 // Returns the writer's status for a failure of AddPoints.
-absl::Status LocalChanges::WhyNotBuilt(RegisteredHull& hull, const absl::Status& cause) {
+absl::Status LocalChanges::BuildFailure(RegisteredHull& hull, const absl::Status& cause) {
   if (absl::IsDataLoss(cause)) state_.MarkDamaged(hull, cause);
   if (!absl::IsResourceExhausted(cause)) return cause;
   return LimitExceeded(
@@ -414,7 +412,7 @@ void LocalChanges::SubmitChunk(Locked& locked, const HullPointer& hull, PendingC
   // If a peer server may commit first, keeps the chunk for a retry.
   std::shared_ptr<PendingChunk> kept;
   const Reply<ChunkResult> done = pending.done;
-  const WriterSequence writer = *built.change.writer;
+  const uint64_t sequence = built.change.writer->sequence;
   if (peers_.has_peers()) {
     kept = std::make_shared<PendingChunk>(std::move(pending));
     // NOLINTNEXTLINE(bugprone-use-after-move): it is the caller's again
@@ -427,13 +425,11 @@ void LocalChanges::SubmitChunk(Locked& locked, const HullPointer& hull, PendingC
       hull->Requeue(std::move(*kept));
       return;
     }
-    if (!status.ok()) {
-      return AnswerChunk(later, done, writer.sequence, status);
-    }
-    state_.ApplyChunk(later, hull, {change.hull, mark, writer, counts.outside});
+    if (!status.ok()) return AnswerChunk(later, done, sequence, status);
+    state_.ApplyChunk(later, hull, change, mark, counts.outside);
     const HullRecord& record = change.hull.record;
     AnswerChunk(
-        later, done, writer.sequence,
+        later, done, sequence,
         ChunkResult{state_.revision(), false, record.revision, record.vertex_count, counts});
   };
   hull->state.Submit();

@@ -42,6 +42,19 @@ void RestoreReplacement(RegisteredHull& hull, Change& change, Replacement& repla
   }
 }
 
+// Returns true if a change was refused: runs it again if a peer server superseded it, and answers
+// the caller otherwise.
+template <typename Refuse>
+bool IsRefused(Locked& locked, const absl::Status& status, const LockedTask& again,
+               const Refuse& refuse) {
+  if (Committer::IsSuperseded(status)) {
+    locked.AfterwardsLocked(again);
+  } else if (!status.ok()) {
+    locked.Afterwards([=] { refuse(status); });
+  }
+  return !status.ok();
+}
+
 }  // namespace
 
 void LocalChanges::Create(const std::string& id, bool if_absent, const Reply<PutHullResult>& done) {
@@ -50,11 +63,9 @@ void LocalChanges::Create(const std::string& id, bool if_absent, const Reply<Put
         const HullPointer existing = state_.Find(id);
         if (existing == nullptr) {
           return CreateNew(
-              locked, id, [=, this](Locked& later, const absl::StatusOr<HullPointer>& hull) {
-                if (Committer::IsSuperseded(hull.status())) return later.AfterwardsLocked(again);
-                if (!hull.ok()) return Answer(later, done, hull.status());
+              locked, id, done, again, [=, this](Locked& later, const HullPointer& hull) {
                 Answer(later, done,
-                       PutHullResult{state_.revision(), (*hull)->committed().record, true});
+                       PutHullResult{state_.revision(), hull->committed().record, true});
               });
         }
         if (!if_absent) {
@@ -71,22 +82,23 @@ void LocalChanges::Create(const std::string& id, bool if_absent, const Reply<Put
       });
 }
 
-// Creates a hull. done: called with the mutex held when the hull becomes visible, or with an error;
-// ABORTED (Committer::IsSuperseded): a peer server changed the ID first. Requires: the ID is known
-// to have no hull (checked), and no change of a body with the ID is in flight (not checked: its
-// completion would find the hull).
-void LocalChanges::CreateNew(Locked& locked, const std::string& id, const Creation& done) {
-  if (state_.bodies.contains(id)) return done(locked, IdTaken("body", id));
-  if (absl::Status s = state_.CheckHullCount(); !s.ok()) return done(locked, s);
+// Creates a hull. done: called with the mutex held when the hull becomes visible. again: called if
+// a peer server changed the ID first. Requires: the ID is known to have no hull (checked), and no
+// change of a body with the ID is in flight (not checked: its completion would find the hull).
+void LocalChanges::CreateNew(Locked& locked, const std::string& id, const Refusal& refuse,
+                             const LockedTask& again, const Creation& done) {
+  const absl::Status allowed =
+      state_.bodies.contains(id) ? IdTaken("body", id) : state_.CheckHullCount();
+  if (IsRefused(locked, allowed, again, refuse)) return;
   Change change;
   change.begins = true;
   change.hull.record.hull_id = id;
   const HullPointer hull = state_.hulls.Insert(change.hull, HullState::Creating());
   state_.BeginCreatingHull();
   Submit(locked, hull, std::move(change),
-         [this, hull, done](Locked& later, const absl::Status& status, const Change& creation) {
+         [=, this](Locked& later, const absl::Status& status, const Change& creation) {
            state_.EndCreatingHull(later, hull, status);
-           if (!status.ok()) return done(later, status);
+           if (IsRefused(later, status, again, refuse)) return;
            state_.ApplyCreation(later, nullptr, hull, creation.hull);
            done(later, hull);
          });
@@ -109,8 +121,7 @@ void LocalChanges::Delete(const std::string& kind, const std::string& id,
     }
     const auto finish = [=, this](Locked& later, const absl::Status& status,
                                   const Change& deletion) {
-      if (Committer::IsSuperseded(status)) return later.AfterwardsLocked(again);
-      if (!status.ok()) return Answer(later, done, status);
+      if (IsRefused(later, status, again, done)) return;
       is_body ? state_.ApplyBody(later, id, nullptr, deletion.revision)
               : state_.ApplyDeletion(later, hull, deletion.revision);
       Answer(later, done, deletion.revision);
@@ -177,11 +188,9 @@ void LocalChanges::CommitReplacement(Locked& locked, const HullPointer& former,
   hull->SetBuilder(std::make_unique<HullBuilder>(std::move(*replacement->builder)));
   Submit(locked, former == nullptr ? hull : former, std::move(change),
          [=, this](Locked& later, const absl::Status& status, Change& replaced) {
-           const bool is_superseded = Committer::IsSuperseded(status);
-           if (is_superseded) RestoreReplacement(*hull, replaced, *replacement);
+           if (Committer::IsSuperseded(status)) RestoreReplacement(*hull, replaced, *replacement);
            if (former == nullptr) state_.EndCreatingHull(later, hull, status);
-           if (is_superseded) return later.AfterwardsLocked(again);
-           if (!status.ok()) return Answer(later, done, status);
+           if (IsRefused(later, status, again, done)) return;
            state_.ApplyCreation(later, former, hull, replaced.hull);
            hull->DiscardUnneededBuilder(later);
            hull->NoteUse();
@@ -213,16 +222,14 @@ void LocalChanges::PutBody(StoredBody stored, std::optional<uint64_t> if_revisio
         // A damaged body starts over.
         change.begins = created == 0;
         change.replaces_body = change.begins && !is_new;
-        SubmitBody(locked, std::move(change),
-                   [=, this](Locked& later, const absl::Status& status, const Change& put) {
-                     if (is_new) state_.EndCreatingBody(status.ok());
-                     if (Committer::IsSuperseded(status)) return later.AfterwardsLocked(again);
-                     if (!status.ok()) return Answer(later, done, status);
-                     state_.ApplyBody(later, id, body, put.revision);
-                     Answer(later, done,
-                            PutBodyResult{state_.revision(), body->record(), body->pieces().size(),
-                                          is_new});
-                   });
+        SubmitBody(
+            locked, std::move(change),
+            [=, this](Locked& later, const absl::Status& status, const Change& put) {
+              if (is_new) state_.EndCreatingBody(status.ok());
+              if (IsRefused(later, status, again, done)) return;
+              state_.ApplyBody(later, id, body, put.revision);
+              Answer(later, done, PutBodyResult{state_.revision(), body->Describe(), is_new});
+            });
       });
 }
 
@@ -277,9 +284,7 @@ void LocalChanges::Submit(Locked& locked, const HullPointer& hull, Change change
                       status.ok() ? hull->state.Commit() : hull->state.Refuse();
                       finish(later, status, committed);
                       // The peer change must be applied first.
-                      if (Committer::IsSuperseded(status)) {
-                        return peers_.Defer([this, hull](Locked& next) { Advance(next, hull); });
-                      }
+                      if (Committer::IsSuperseded(status)) return DeferAdvance(hull);
                       // A hull at rest may be evicted.
                       if (hull->state.quiet() && !hull->state.gone()) {
                         hull->DiscardUnneededBuilder(later);
@@ -320,9 +325,8 @@ void LocalChanges::Advance(Locked& locked, const HullPointer& hull, bool is_last
   });
 }
 
-void LocalChanges::OnPeerChange(Locked& /*locked*/, const std::string& /*id*/,
-                                const HullPointer& hull) {
-  if (hull != nullptr) peers_.Defer([this, hull](Locked& later) { Advance(later, hull); });
+void LocalChanges::DeferAdvance(const HullPointer& hull) {
+  peers_.Defer([this, hull](Locked& later) { Advance(later, hull); });
 }
 
 }  // namespace hulld::server

@@ -51,7 +51,7 @@ struct PendingChunk;
 //     unchanged.
 //
 // Guarded by the registry's mutex; functions without a Locked parameter acquire it.
-class LocalChanges : public PeerChangeListener {
+class LocalChanges {
  public:
   // All must outlive this. Chunks are built on `writers`.
   LocalChanges(RegistryState& state, Committer& committer, PeerSync& peers, RecordReader& records,
@@ -103,18 +103,19 @@ class LocalChanges : public PeerChangeListener {
   void Append(const AppendSession& session, Chunk chunk, std::function<bool()> should_stop,
               std::function<void()> on_built, Reply<ChunkResult> done);
 
-  // Resumes the tasks that wait for the hull.
-  void OnPeerChange(Locked& locked, const std::string& id, const HullPointer& hull) override;
+  // Defers the tasks that wait for the hull, which a peer server changed. Requires the mutex.
+  void DeferAdvance(const HullPointer& hull);
 
  private:
-  using Creation = std::function<void(Locked&, absl::StatusOr<HullPointer>)>;
+  using Creation = std::function<void(Locked&, const HullPointer&)>;
   struct OpenRequest;
   struct BuiltChunk;
 
   void Submit(Locked& locked, const HullPointer& hull, Change change, Committer::Completion finish);
   void Advance(Locked& locked, const HullPointer& hull, bool is_last = false);
 
-  void CreateNew(Locked& locked, const std::string& id, const Creation& done);
+  void CreateNew(Locked& locked, const std::string& id, const Refusal& refuse,
+                 const LockedTask& again, const Creation& done);
   absl::Status CheckPutBody(Locked& locked, const std::string& id,
                             std::optional<uint64_t> if_revision);
   void SubmitBody(Locked& locked, Change change, Committer::Completion finish);
@@ -140,7 +141,7 @@ class LocalChanges : public PeerChangeListener {
   absl::StatusOr<std::shared_ptr<LiveHull>> LiveForWriter(Locked& locked, RegisteredHull& hull);
   absl::StatusOr<PointCounts> AddPoints(PendingChunk& pending, LentBuilder& lent, LiveHull& live,
                                         BuiltChunk& built);
-  absl::Status WhyNotBuilt(RegisteredHull& hull, const absl::Status& cause);
+  absl::Status BuildFailure(RegisteredHull& hull, const absl::Status& cause);
   void SubmitChunk(Locked& locked, const HullPointer& hull, PendingChunk& pending,
                    BuiltChunk built);
 

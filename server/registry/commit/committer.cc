@@ -56,7 +56,7 @@ void Committer::StartBarrier(Locked& locked, Barrier barrier) {
   bool may_start = false;
   {
     const std::lock_guard lock(mutex_);
-    may_start = feed_ != nullptr && is_idle_ && !is_starting_ && !started_.asked.has_value() &&
+    may_start = feed_ != nullptr && is_idle_ && !is_starting_ && !started_.queried_at.has_value() &&
                 queue_.empty() && barriers_.empty();
     barriers_.push_back(std::move(barrier));
     if (may_start) is_starting_ = true;
@@ -72,7 +72,7 @@ void Committer::StartBarrier(Locked& locked, Barrier barrier) {
 void Committer::StartFetch() {
   {
     const std::lock_guard lock(mutex_);
-    started_.asked = SteadyClock::now();
+    started_.queried_at = SteadyClock::now();
     started_.barriers = std::exchange(barriers_, {});
   }
   feed_->StartFetch();
@@ -93,7 +93,8 @@ void Committer::Run() {
 
 void Committer::CommitRound(Round round) {
   // Measured before anything is sent, because a commit queries peer changes as well.
-  const SteadyClock::time_point asked = round.asked.has_value() ? *round.asked : SteadyClock::now();
+  const SteadyClock::time_point queried_at =
+      round.queried_at.has_value() ? *round.queried_at : SteadyClock::now();
   absl::Status status;
   if (!round.batch.empty()) status = Write(round.batch);
   if (!status.ok()) {
@@ -101,13 +102,13 @@ void Committer::CommitRound(Round round) {
     // contain this batch at that point.
     Round barriers;
     barriers.barriers = std::exchange(round.barriers, {});
-    Settle(round, status, absl::OkStatus(), asked);
+    Settle(round, status, absl::OkStatus(), queried_at);
     if (barriers.IsEmpty()) return;
     round = std::move(barriers);
     status = absl::OkStatus();
   }
   // A commit has already queried the peer changes.
-  Settle(round, status, round.batch.empty() ? Fetch() : absl::OkStatus(), asked);
+  Settle(round, status, round.batch.empty() ? Fetch() : absl::OkStatus(), queried_at);
 }
 
 // Fetches the commits of peer servers for a round of barriers. Without peer servers, resolves the
@@ -127,10 +128,10 @@ Committer::Round Committer::WaitForRound() {
   is_idle_ = true;
   ready_.wait(lock, [this] {
     if (is_starting_) return false;
-    return ending_ || started_.asked.has_value() || !queue_.empty() || !barriers_.empty();
+    return ending_ || started_.queried_at.has_value() || !queue_.empty() || !barriers_.empty();
   });
   is_idle_ = false;
-  if (started_.asked.has_value()) return std::exchange(started_, {});
+  if (started_.queried_at.has_value()) return std::exchange(started_, {});
   Round round = {std::exchange(queue_, {}), std::exchange(barriers_, {}), {}};
   has_ended_ = round.IsEmpty();
   return round;
@@ -170,10 +171,10 @@ PeerChanges Committer::TakePeerChanges(const absl::Status& status) {
   return changes;
 }
 
-// Completes a committed batch; or refuses a failed batch and everything pending. asked: the
+// Completes a committed batch; or refuses a failed batch and everything pending. queried_at: the
 // earliest time of the store query.
 void Committer::Settle(Round& round, const absl::Status& status, const absl::Status& fetched,
-                       SteadyClock::time_point asked) {
+                       SteadyClock::time_point queried_at) {
   std::vector<Pending>& batch = round.batch;
   // Evaluated before superseded changes are removed from the batch.
   const bool was_written = !batch.empty();
@@ -181,7 +182,7 @@ void Committer::Settle(Round& round, const absl::Status& status, const absl::Sta
   if (feed_ != nullptr) changes = TakePeerChanges(was_written ? status : fetched);
   Locked locked(order_);
   if (changes.revision != 0) ApplyPeerChanges(locked, changes, batch);
-  if (feed_ != nullptr && status.ok() && fetched.ok()) peers_->NoteSynced(asked);
+  if (feed_ != nullptr && status.ok() && fetched.ok()) peers_->NoteSynced(queried_at);
   if (was_written) {
     const std::lock_guard lock(mutex_);
     if (!status.ok() && !statistics_.failing) {

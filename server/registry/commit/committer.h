@@ -67,9 +67,9 @@ class Committer {
     // and before the committed changes of the same batch complete, which have later revisions. No
     // change of these IDs is in flight.
     virtual void Apply(Locked& order, const PeerChanges& changes) = 0;
-    // Records that all commits of peer servers before `asked` are applied: a query for them was
-    // sent at that time, and has been answered.
-    virtual void NoteSynced(SteadyClock::time_point asked) = 0;
+    // Records that all commits of peer servers before `queried_at` are applied: a query for them
+    // was sent at that time, and has been answered.
+    virtual void NoteSynced(SteadyClock::time_point queried_at) = 0;
   };
 
   // Completions of committed changes within one hold of `order`; each takes about a microsecond.
@@ -113,7 +113,7 @@ class Committer {
     std::vector<Pending> batch;
     std::vector<Barrier> barriers;
     // Time of a query already sent for the barriers, which are then the only work of the round.
-    std::optional<SteadyClock::time_point> asked;
+    std::optional<SteadyClock::time_point> queried_at;
 
     bool IsEmpty() const { return batch.empty() && barriers.empty(); }
   };
@@ -126,7 +126,7 @@ class Committer {
   absl::Status Write(std::vector<Pending>& batch);
   PeerChanges TakePeerChanges(const absl::Status& status);
   void Settle(Round& round, const absl::Status& status, const absl::Status& fetched,
-              SteadyClock::time_point asked);
+              SteadyClock::time_point queried_at);
   void ApplyPeerChanges(Locked& locked, const PeerChanges& changes, std::vector<Pending>& batch);
 
   Store& store_;

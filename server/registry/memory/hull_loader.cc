@@ -9,7 +9,7 @@
 
 #include "core/numeric/orientation.h"
 #include "server/contract/stopped_call.h"
-#include "server/process/shared_loop.h"
+#include "server/process/parallel_loop.h"
 #include "server/store/store_errors.h"
 
 namespace hulld::server {
@@ -69,9 +69,9 @@ std::vector<LoadedHull> LoadEach(Store& store, std::span<const StoredHull> hulls
       loaded[i] = MakeLive(hulls[i], std::move(points[i - begin]));
     }
   };
-  SharedLoop::Run(helpers, std::min(helpers.threads(), hulls.size() / kMinHullsPerThread),
-                  hulls.size(), std::clamp<size_t>(hulls.size() / kMinSteps, 1, kMaxPerStep), load,
-                  should_stop);
+  ParallelLoop::Run(helpers, std::min(helpers.threads(), hulls.size() / kMinHullsPerThread),
+                    hulls.size(), std::clamp<size_t>(hulls.size() / kMinSteps, 1, kMaxPerStep),
+                    load, should_stop);
   return loaded;
 }
 

@@ -32,13 +32,13 @@ PeerSync::PeerSync(RegistryState& state, Committer& committer)
 }
 
 // The pages of the initial load span more than one revision.
-absl::Status PeerSync::Begin(Locked& locked, std::vector<PeerChangeListener*> listeners) {
+absl::Status PeerSync::Begin(Locked& locked, OnChange on_change) {
   if (!has_peers()) return absl::OkStatus();
-  listeners_ = std::move(listeners);
-  const SteadyClock::time_point asked = SteadyClock::now();
+  on_change_ = std::move(on_change);
+  const SteadyClock::time_point queried_at = SteadyClock::now();
   absl::Status fetched = feed_->Fetch();
   Apply(locked, feed_->TakeChanges());
-  if (fetched.ok()) NoteSynced(asked);
+  if (fetched.ok()) NoteSynced(queried_at);
   feed_->OnPeerCommit([this] { committer_.AddBarrier([](Locked&, const absl::Status&) {}); });
   return fetched;
 }
@@ -148,13 +148,12 @@ void PeerSync::Apply(Locked& locked, const PeerChanges& changes) {
   std::ranges::sort(in_order);
   const uint64_t since = state_.revision();
   for (const auto& [revision, id] : in_order) {
-    const auto hull = state_.ApplyPeerChange(locked, *id, changes.by_id.at(*id), since);
-    for (PeerChangeListener* const each : listeners_) each->OnPeerChange(locked, *id, hull);
+    on_change_(*id, state_.ApplyPeerChange(locked, *id, changes.by_id.at(*id), since));
     state_.hulls.RestSome(locked);
     state_.bodies.DropSome(locked);
   }
   if (state_.is_cache() && changes.revision > 0) state_.SetTotals(changes.totals);
-  if (changes.revision > state_.revision()) state_.ApplyOther(locked, changes.revision);
+  if (changes.revision > state_.revision()) state_.feed.NoteOther(locked, changes.revision);
   state_.memory.Evict(locked);
   // Tasks deferred by these tasks wait for the next changes.
   for (const LockedTask& task : std::exchange(deferred_, {})) task(locked);

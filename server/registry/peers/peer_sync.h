@@ -20,22 +20,13 @@
 
 namespace hulld::server {
 
-// A part of the registry in which tasks wait for the state of an ID.
-class PeerChangeListener {
- public:
-  virtual ~PeerChangeListener() = default;
-  // Defers the tasks that wait for the ID, after a peer server's change of it was applied. hull:
-  // the known hull that the change updated or ended, or null.
-  virtual void OnPeerChange(Locked& locked, const std::string& id, const HullPointer& hull) = 0;
-};
-
 // Keeps the registry in step with the peer servers over one database: follows their commits,
 // applies them to the state, and blocks calls until the state satisfies their freshness. If the
 // store has no PeerFeed, the registry is always current, and nothing blocks.
 //
 // Peer changes are applied on the committer's thread, after the superseded local changes were
 // refused, so no local change to the same IDs is being committed. A thread may still build a chunk
-// on such a hull, or read its record; the state of the hull, or of the reading, shows that it was
+// on such a hull, or read its record; the state of the hull, or of the read, shows that it was
 // superseded. Tasks that depend on a changed ID run after all changes of the same fetch are applied
 // (Defer).
 //
@@ -57,9 +48,12 @@ class PeerSync : public Committer::Peers {
   // then retried.
   bool has_peers() const { return feed_ != nullptr; }
 
-  // Applies the peer changes since the initial load, and follows the feed until End. listeners: in
-  // the order of notification. Call once, before the first change.
-  absl::Status Begin(Locked& locked, std::vector<PeerChangeListener*> listeners);
+  // Called after a peer server's change of the ID was applied, to defer the tasks that wait for the
+  // ID. hull: the known hull that the change updated or ended, or null.
+  using OnChange = std::function<void(const std::string& id, const HullPointer& hull)>;
+  // Applies the peer changes since the initial load, and follows the feed until End. Call once,
+  // before the first change.
+  absl::Status Begin(Locked& locked, OnChange on_change);
   void End();
 
   // Read barrier: blocks until all changes that peer servers committed before the call are applied.
@@ -99,14 +93,14 @@ class PeerSync : public Committer::Peers {
   // committed state does not change before Apply, because the same thread calls both.
   std::vector<HullGrowth> GrownHulls(const PeerChanges& changes) const override;
   void Apply(Locked& locked, const PeerChanges& changes) override;
-  void NoteSynced(SteadyClock::time_point asked) override { synced_at_ = asked; }
+  void NoteSynced(SteadyClock::time_point queried_at) override { synced_at_ = queried_at; }
 
  private:
   RegistryState& state_;
   Committer& committer_;
   // Null without peer servers.
   PeerFeed* const feed_;
-  std::vector<PeerChangeListener*> listeners_;
+  OnChange on_change_;
   // The registry's mutex guards the members below.
   std::vector<LockedTask> deferred_;
   // Time at which the last answered query was sent; all commits of peer servers before it are

@@ -104,7 +104,7 @@ absl::Status HullReader::LookUp(Locked& locked, const HullsRead& read, uint32_t 
   bool was_missing = false;
   while (true) {
     std::optional<HullPointer> found = std::exchange(known.found, nullptr);
-    if (*found == nullptr || (*found)->state.gone()) found = state_.hulls.Ask(id);
+    if (*found == nullptr || (*found)->state.gone()) found = state_.hulls.LookUp(id);
     if (!found.has_value() && !state_.bodies.contains(id)) {
       if (!plan.may_wait) return WouldWait();
       if (absl::Status s = AwaitRecord(locked, read, k); !s.ok()) return NoteFailure(s, known);

@@ -20,10 +20,10 @@ namespace {
 constexpr size_t kMaxAtOnce = kMaxLookupsPerHold;
 constexpr size_t kMaxThreads = 2;
 
-// The store reported an older revision than `asked_at`, its revision before the query.
-absl::Status WentBack(uint64_t found, uint64_t asked_at) {
+// The store reported an older revision than `queried_at`, its revision before the query.
+absl::Status WentBack(uint64_t found, uint64_t queried_at) {
   return absl::UnavailableError(absl::StrCat(
-      "the store is at revision ", found, " but was at ", asked_at,
+      "the store is at revision ", found, " but was at ", queried_at,
       " earlier: it was restored to an earlier state, or another database is answering"));
 }
 
@@ -35,19 +35,20 @@ absl::Status IsAhead(uint64_t found, uint64_t known) {
 
 }  // namespace
 
-std::pair<std::shared_ptr<RecordReader::Reading>, bool> RecordReader::Join(const std::string& id) {
-  std::shared_ptr<Reading>& reading = readings_[id];
-  const bool is_new = reading == nullptr;
-  if (is_new) reading = std::make_shared<Reading>(Reading{id, {}});
-  return {reading, is_new};
+std::pair<std::shared_ptr<RecordReader::PendingRead>, bool> RecordReader::Join(
+    const std::string& id) {
+  std::shared_ptr<PendingRead>& pending = reads_[id];
+  const bool is_new = pending == nullptr;
+  if (is_new) pending = std::make_shared<PendingRead>(PendingRead{id, {}});
+  return {pending, is_new};
 }
 
 void RecordReader::WhenKnown(const std::string& id, Committer::Barrier done) {
   HULLD_CHECK(!state_.IsKnown(id));
-  const auto [reading, is_new] = Join(id);
-  reading->waiting.push_back(std::move(done));
+  const auto [pending, is_new] = Join(id);
+  pending->waiting.push_back(std::move(done));
   if (!is_new) return;
-  due_.push_back(reading);
+  due_.push_back(pending);
   if (threads_ == kMaxThreads) return;
   ++threads_;
   loaders_.Submit([this] { ReadDue(); }, kRecordReader);
@@ -80,7 +81,7 @@ void RecordReader::ReadDue() {
   if (!due_.empty()) {
     const auto first = due_.begin();
     const auto last = first + std::min<ptrdiff_t>(due_.size(), kMaxAtOnce);
-    const Readings taken(first, last);
+    const PendingReads taken(first, last);
     due_.erase(first, last);
     ReadRecords(locked, taken);
   }
@@ -96,17 +97,17 @@ absl::Status RecordReader::AwaitKnown(Locked& locked, std::span<const std::strin
   HULLD_CHECK(!ids.empty() && ids.size() <= kMaxAtOnce);
   // Runs the deferred tasks before waiting.
   locked.Yield();
-  Readings own;
-  std::shared_ptr<Reading> awaited;
+  PendingReads own;
+  std::shared_ptr<PendingRead> awaited;
   for (const std::string* const id : ids) {
     locked.NoteLookup();
     if (state_.IsKnown(*id)) {
       if (awaited == nullptr) return absl::OkStatus();
       continue;
     }
-    const auto [reading, is_new] = Join(*id);
-    if (is_new) own.push_back(reading);
-    if (awaited == nullptr) awaited = reading;
+    const auto [pending, is_new] = Join(*id);
+    if (is_new) own.push_back(pending);
+    if (awaited == nullptr) awaited = pending;
   }
   const absl::Status read = locked.AwaitCall(should_stop, [&](const auto& done) {
     awaited->waiting.push_back(done);
@@ -151,38 +152,38 @@ FoundBodies RecordReader::FindBodies(std::span<const std::string> ids,
   return found;
 }
 
-// Releases the mutex during the read. The readings may end later than this call.
-void RecordReader::ReadRecords(Locked& locked, const Readings& readings) {
+// Releases the mutex during the read. The reads may end later than this call.
+void RecordReader::ReadRecords(Locked& locked, const PendingReads& reads) {
   std::vector<std::string> ids;
-  ids.reserve(readings.size());
-  for (const auto& reading : readings) ids.push_back(reading->id);
-  const uint64_t asked_at = state_.revision();
+  ids.reserve(reads.size());
+  for (const auto& pending : reads) ids.push_back(pending->id);
+  const uint64_t queried_at = state_.revision();
   locked.Unlock();
   const auto found =
       std::make_shared<const absl::StatusOr<FoundRecords>>(state_.store.FindRecords(ids));
   locked.Lock();
-  WhenReached(locked, asked_at, found,
-              [this, readings, found](Locked& later, const absl::Status& status) {
-                TakeRecords(later, readings, found, status);
+  WhenReached(locked, queried_at, found,
+              [this, reads, found](Locked& later, const absl::Status& status) {
+                TakeRecords(later, reads, found, status);
               });
 }
 
-// Ends the readings with the records, or with an error.
-void RecordReader::TakeRecords(Locked& locked, const Readings& readings, const Found& found,
+// Ends the reads with the records, or with an error.
+void RecordReader::TakeRecords(Locked& locked, const PendingReads& reads, const Found& found,
                                const absl::Status& status) {
   // Evicts first, so that the new records are still known when their callers resume.
-  for (size_t i = 0; i < readings.size(); ++i) state_.hulls.RestSome(locked);
+  for (size_t i = 0; i < reads.size(); ++i) state_.hulls.RestSome(locked);
   state_.bodies.DropSome(locked);
-  Readings open;
-  for (const auto& reading : readings) {
-    const auto current = readings_.find(reading->id);
-    if (current == readings_.end() || current->second != reading) continue;
-    if (status.ok()) TakeRecord(locked, reading->id, **found);
-    readings_.erase(current);
-    open.push_back(reading);
+  PendingReads open;
+  for (const auto& pending : reads) {
+    const auto current = reads_.find(pending->id);
+    if (current == reads_.end() || current->second != pending) continue;
+    if (status.ok()) TakeRecord(locked, pending->id, **found);
+    reads_.erase(current);
+    open.push_back(pending);
   }
-  for (const auto& reading : open) {
-    for (const Committer::Barrier& done : reading->waiting) done(locked, status);
+  for (const auto& pending : open) {
+    for (const Committer::Barrier& done : pending->waiting) done(locked, status);
   }
 }
 
@@ -190,30 +191,26 @@ void RecordReader::TakeRecord(Locked& locked, const std::string& id, const Found
   HULLD_CHECK(!state_.IsKnown(id));
   const auto hull = found.hulls.find(id);
   const auto body = found.bodies.find(id);
-  const bool has_hull = hull != found.hulls.end();
-  const bool has_body = body != found.bodies.end();
-  if (!has_hull && !has_body) return state_.hulls.NoteAbsent(id);
-  if (!has_hull) return state_.AddBody(locked, id, body->second);
-  if (has_body) RegistryState::LogBodyUnderHull(id);
-  state_.AddStored(id, hull->second);
+  if (hull != found.hulls.end()) state_.AddStored(id, hull->second);
+  if (body != found.bodies.end()) state_.AddBody(locked, id, body->second);
+  if (!state_.IsKnown(id)) state_.hulls.NoteAbsent(id);
 }
 
-void RecordReader::OnPeerChange(Locked& /*locked*/, const std::string& id,
-                                const HullPointer& /*hull*/) {
-  const auto found = readings_.find(id);
-  if (found == readings_.end()) return;
+void RecordReader::OnPeerChange(const std::string& id) {
+  const auto found = reads_.find(id);
+  if (found == reads_.end()) return;
   if (!state_.IsKnown(id)) state_.hulls.NoteAbsent(id);
   for (Committer::Barrier& done : found->second->waiting) {
     peers_.Defer([done = std::move(done)](Locked& later) { done(later, absl::OkStatus()); });
   }
-  readings_.erase(found);
+  reads_.erase(found);
 }
 
-void RecordReader::WhenReached(Locked& locked, uint64_t asked_at, const Found& found,
+void RecordReader::WhenReached(Locked& locked, uint64_t queried_at, const Found& found,
                                Committer::Barrier take) {
   if (!found->ok()) return take(locked, found->status());
   const uint64_t revision = (*found)->revision;
-  if (revision < asked_at) return take(locked, WentBack(revision, asked_at));
+  if (revision < queried_at) return take(locked, WentBack(revision, queried_at));
   if (!IsBehind(locked, **found)) return take(locked, absl::OkStatus());
   // After this round of the committer, the registry includes everything that the store contained.
   committer_.AddBarrier(
@@ -266,12 +263,12 @@ absl::StatusOr<RecordPage> RecordReader::List(std::string prefix, std::string af
   if (request.kinds.bodies) {
     HULLD_RETURN_IF_ERROR(state_.memory.Check(locked, MemoryUse::kReading));
   }
-  const uint64_t asked_at = state_.revision();
+  const uint64_t queried_at = state_.revision();
   locked.Unlock();
   const Found found = Query(request);
   locked.Lock();
   HULLD_RETURN_IF_ERROR(locked.AwaitCall(
-      should_stop, [&](const auto& done) { WhenReached(locked, asked_at, found, done); }));
+      should_stop, [&](const auto& done) { WhenReached(locked, queried_at, found, done); }));
   return Describe(locked, **found);
 }
 
@@ -349,10 +346,10 @@ void RecordReader::ReadPage(Locked& locked, PageRequest request,
   if (!state_.is_cache()) return done(locked, CataloguedPage(request));
   loaders_.Submit(
       [this, request = std::move(request), done = std::move(done),
-       asked_at = state_.revision()]() mutable {
+       queried_at = state_.revision()]() mutable {
         const Found found = Query(request);
         Locked later(state_.mutex);
-        WhenReached(later, asked_at, found,
+        WhenReached(later, queried_at, found,
                     [this, found, done = std::move(done)](Locked& now, const absl::Status& status) {
                       if (!status.ok()) return done(now, status);
                       done(now, Describe(now, **found));

@@ -46,7 +46,7 @@ inline constexpr ClientId kWatchReader = {2};
 //     be answered from the earlier one next.
 //
 // Guarded by the registry's mutex, which is released during store queries.
-class RecordReader : public PeerChangeListener, public PageSource {
+class RecordReader final : public PageSource {
  public:
   // All must outlive this. loaders: threads for reads without a blocked caller, and for watches.
   RecordReader(RegistryState& state, Committer& committer, PeerSync& peers, TaskPool& loaders)
@@ -75,8 +75,9 @@ class RecordReader : public PeerChangeListener, public PageSource {
   FoundBodies FindBodies(std::span<const std::string> ids,
                          const std::function<bool()>& should_stop = {}, bool may_wait = true);
 
-  // Ends the read of the ID; its tasks look the ID up again.
-  void OnPeerChange(Locked& locked, const std::string& id, const HullPointer& hull) override;
+  // Ends the read of the ID, which a peer server changed; its tasks look the ID up again. Requires
+  // the mutex.
+  void OnPeerChange(const std::string& id);
 
   // Returns at most `page_size` hulls, or bodies, or both, with IDs that start with `prefix` and
   // follow `after` in byte order; a page of bodies may contain fewer even if more follow. If the
@@ -91,7 +92,7 @@ class RecordReader : public PeerChangeListener, public PageSource {
 
  private:
   // A read of a record. Its callers wait for the registry's mutex, with the error of the read.
-  struct Reading {
+  struct PendingRead {
     std::string id;
     std::vector<Committer::Barrier> waiting;
   };
@@ -102,12 +103,12 @@ class RecordReader : public PeerChangeListener, public PageSource {
     Refusal refuse;
     Task task;
   };
-  using Readings = std::vector<std::shared_ptr<Reading>>;
+  using PendingReads = std::vector<std::shared_ptr<PendingRead>>;
   // The result of a store query, while the registry catches up with it.
   using Found = std::shared_ptr<const absl::StatusOr<FoundRecords>>;
 
   // Returns the read of the record of an ID, and true if it is new.
-  std::pair<std::shared_ptr<Reading>, bool> Join(const std::string& id);
+  std::pair<std::shared_ptr<PendingRead>, bool> Join(const std::string& id);
   // Reads the record of an ID, then calls `done`, which must check again that the ID is known.
   // Requires: the ID is unknown.
   void WhenKnown(const std::string& id, Committer::Barrier done);
@@ -115,15 +116,16 @@ class RecordReader : public PeerChangeListener, public PageSource {
                             const std::function<bool()>& should_stop);
   void RunWhenReady(Locked& locked, const std::shared_ptr<const ReadyTask>& ready);
   void ReadDue();
-  void ReadRecords(Locked& locked, const Readings& readings);
-  void TakeRecords(Locked& locked, const Readings& readings, const Found& found,
+  void ReadRecords(Locked& locked, const PendingReads& reads);
+  void TakeRecords(Locked& locked, const PendingReads& reads, const Found& found,
                    const absl::Status& status);
   void TakeRecord(Locked& locked, const std::string& id, const FoundRecords& found);
 
   // Calls `take`, now or on the committer's thread, when the records found are valid, or with an
-  // error, such as theirs. asked_at: the registry's revision at the time of the store query.
+  // error, such as theirs. queried_at: the registry's revision at the time of the store query.
   // UNAVAILABLE: the store went back, or cannot report the changes in between.
-  void WhenReached(Locked& locked, uint64_t asked_at, const Found& found, Committer::Barrier take);
+  void WhenReached(Locked& locked, uint64_t queried_at, const Found& found,
+                   Committer::Barrier take);
   bool IsBehind(const std::string& id, const absl::StatusOr<StoredHull>& stored) const;
   bool IsBehind(Locked& locked, const FoundRecords& found) const;
 
@@ -140,8 +142,8 @@ class RecordReader : public PeerChangeListener, public PageSource {
 
   // Guarded by mutex_: the unfinished reads, by ID; the reads not yet taken by a thread; and the
   // number of reading threads.
-  std::map<std::string, std::shared_ptr<Reading>> readings_;
-  Readings due_;
+  std::map<std::string, std::shared_ptr<PendingRead>> reads_;
+  PendingReads due_;
   size_t threads_ = 0;
 };
 

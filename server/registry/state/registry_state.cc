@@ -50,19 +50,8 @@ RegistryState::RegistryState(Store& store_in, const Limits& limits_in,
   bodies.KeepAtMost(limits.memory_limit / kBodiesShare);
 }
 
-void RegistryState::Begin(uint64_t revision, PageSource& pages) {
-  HULLD_CHECK(hulls.size() == 0 && revision_ == 0);
-  revision_ = revision;
-  feed.Begin(revision, pages);
-}
-
-void RegistryState::Publish(uint64_t revision) {
-  HULLD_CHECK(revision > revision_);
-  revision_ = revision;
-}
-
 HullPointer RegistryState::Find(const std::string& id) {
-  std::optional<HullPointer> hull = hulls.Ask(id);
+  std::optional<HullPointer> hull = hulls.LookUp(id);
   HULLD_CHECK(hull.has_value() || bodies.contains(id));
   return std::move(hull).value_or(nullptr);
 }
@@ -93,7 +82,6 @@ absl::Status RegistryState::NoSuchBody(const std::string& id) const {
 void RegistryState::AddStored(const std::string& id, const absl::StatusOr<StoredHull>& stored) {
   if (stored.ok()) {
     hulls.AddResting(*stored);
-    if (!is_cache_) NoteVertices(0, stored->record.vertex_count);
     return;
   }
   spdlog::error("{}", std::string(stored.status().message()));
@@ -124,15 +112,14 @@ void RegistryState::Forget(Locked& locked, const HullPointer& hull, const absl::
   hull->account.Close();
 }
 
-void RegistryState::AddStoredBody(Locked& locked, const std::string& id,
-                                  const absl::StatusOr<StoredBody>& stored) {
-  if (hulls.contains(id)) return LogBodyUnderHull(id);
-  AddBody(locked, id, stored);
-  ++kept_bodies_;
-}
-
 void RegistryState::AddBody(Locked& locked, const std::string& id,
                             const absl::StatusOr<StoredBody>& stored) {
+  if (hulls.contains(id)) {
+    return spdlog::error(
+        "the store contains a body under the ID of hull \"{}\"; the body is ignored; delete one of "
+        "the two",
+        id);
+  }
   if (!stored.ok()) {
     spdlog::error("{}", std::string(stored.status().message()));
     ++statistics.damaged;
@@ -142,13 +129,6 @@ void RegistryState::AddBody(Locked& locked, const std::string& id,
              std::make_shared<const Body>(id, stored, memory,
                                           is_cache_ ? MemoryUse::kReading : MemoryUse::kWriting));
   hulls.ForgetAbsent(id);
-}
-
-void RegistryState::LogBodyUnderHull(const std::string& id) {
-  spdlog::error(
-      "the store contains a body under the ID of hull \"{}\"; the body is ignored; delete one of "
-      "the two",
-      id);
 }
 
 void RegistryState::EraseBody(Locked& locked, const std::string& id) {
@@ -166,7 +146,7 @@ absl::Status RegistryState::CheckHullCount() const {
 }
 
 RegistrySizes RegistryState::Sizes() const {
-  return {revision_, HullCount() - creating_hulls_, vertex_count_, kept_bodies_};
+  return {revision(), HullCount() - creating_hulls_, vertex_count_, kept_bodies_};
 }
 
 void RegistryState::EndCreatingHull(Locked& locked, const HullPointer& hull,
@@ -182,7 +162,6 @@ void RegistryState::EndCreatingBody(bool is_committed) {
 }
 
 void RegistryState::SetTotals(const StoreTotals& totals) {
-  HULLD_CHECK(is_cache_);
   kept_hulls_ = totals.hulls;
   vertex_count_ = totals.vertices;
   kept_bodies_ = totals.bodies;
@@ -201,14 +180,12 @@ void RegistryState::ApplyCreation(Locked& locked, const HullPointer& former,
     hulls.Insert(hull);
   }
   NoteVertices(0, stored.record.vertex_count);
-  Publish(stored.record.revision);
   NoteChange(*hull);
   feed.NotePresent(locked, replaced, hull, nullptr);
 }
 
 void RegistryState::ApplyDeletion(Locked& locked, const HullPointer& hull, uint64_t revision) {
   const HullRecord& record = hull->committed().record;
-  Publish(revision);
   NoteVertices(record.vertex_count, 0);
   --kept_hulls_;
   NoteChange(*hull);
@@ -216,14 +193,13 @@ void RegistryState::ApplyDeletion(Locked& locked, const HullPointer& hull, uint6
   Forget(locked, hull, Gone(record.hull_id, "deleted"));
 }
 
-void RegistryState::ApplyChunk(Locked& locked, const HullPointer& hull,
-                               const CommittedChunk& chunk) {
+void RegistryState::ApplyChunk(Locked& locked, const HullPointer& hull, const Change& chunk,
+                               const LiveHull::Mark& mark, uint64_t points) {
   const HullRecord before = hull->committed().record;
   const HullRecord& after = chunk.hull.record;
-  hull->Commit(locked, chunk.hull, chunk.mark, chunk.writer, chunk.vertices);
+  hull->Commit(locked, chunk, mark, points);
   NoteChange(*hull);
   if (after.revision != before.revision) {
-    Publish(after.revision);
     NoteVertices(before.vertex_count, after.vertex_count);
     feed.NotePresent(locked, Incarnation::Of(before), hull, nullptr);
   }
@@ -234,7 +210,6 @@ void RegistryState::ApplyBody(Locked& locked, const std::string& id,
                               const std::shared_ptr<const Body>& body, uint64_t revision) {
   std::optional<Incarnation> former;
   if (const auto known = FindBody(id)) former = Incarnation::Of(known->record());
-  Publish(revision);
   // For readers that look for a hull with this ID.
   recent_changes.Note(id);
   bodies.Set(locked, id, body);
@@ -249,26 +224,36 @@ void RegistryState::ApplyBody(Locked& locked, const std::string& id,
 HullPointer RegistryState::ApplyPeerChange(Locked& locked, const std::string& id,
                                            const PeerChange& change, uint64_t since) {
   const std::optional<Incarnation> former = FindFormer(id, change, since);
+  const StoreTotals before = TotalsOf(id);
   HullPointer hull = hulls.Find(id);
   // False for changes that were part of the initial load.
   const bool is_new = change.revision > revision();
-  if (is_new) {
-    Publish(change.revision);
-    // Includes hulls that were created and deleted in between, because a reader must learn of that,
-    // too.
-    recent_changes.Note(id);
+  // Includes hulls that were created and deleted in between, because a reader must learn of that,
+  // too.
+  if (is_new) recent_changes.Note(id);
+  if (hull == nullptr || !ApplyPeerVersion(locked, hull, change)) {
+    if (hull != nullptr) EndFormer(locked, hull, change);
+    ApplyPeerBody(locked, id, change);
+    if (change.hull.has_value()) {
+      AddStored(id, *change.hull);
+      NoteChange(*hulls.Find(id));
+    }
   }
-  if (hull != nullptr) {
-    if (ApplyPeerVersion(locked, hull, change, is_new)) return hull;
-    EndFormer(locked, hull, change);
-  }
-  ApplyPeerBody(locked, id, change);
-  if (change.hull.has_value()) {
-    AddStored(id, *change.hull);
-    NoteChange(*hulls.Find(id));
+  if (!is_cache_) {
+    const StoreTotals now = TotalsOf(id);
+    kept_hulls_ += now.hulls - before.hulls;
+    kept_bodies_ += now.bodies - before.bodies;
+    NoteVertices(before.vertices, now.vertices);
   }
   if (is_new) Note(locked, id, change, former);
   return hull;
+}
+
+// Counts the known hull or body with this ID.
+StoreTotals RegistryState::TotalsOf(const std::string& id) {
+  const HullPointer hull = hulls.Find(id);
+  const uint64_t vertices = hull == nullptr ? 0 : hull->committed().record.vertex_count;
+  return {hull != nullptr, vertices, bodies.contains(id)};
 }
 
 // Returns the incarnation that had the ID after all changes up to `since`. If it is not known here,
@@ -281,12 +266,10 @@ std::optional<Incarnation> RegistryState::FindFormer(const std::string& id,
     if (hull == nullptr) return std::nullopt;
     return Incarnation::Of(hull->committed().record);
   }
-  std::optional<Incarnation> former;
-  if (change.former_began != 0) {
-    former = {change.former_began, change.former_was_body};
-  } else if (change.hull.has_value() && change.hull->ok()) {
+  std::optional<Incarnation> former = change.former;
+  if (!former.has_value() && change.hull.has_value() && change.hull->ok()) {
     former = Incarnation::Of((*change.hull)->record);
-  } else if (change.body.has_value() && change.body->ok()) {
+  } else if (!former.has_value() && change.body.has_value() && change.body->ok()) {
     former = Incarnation::Of((*change.body)->record);
   }
   return former.has_value() && former->create_revision <= since ? former : std::nullopt;
@@ -294,41 +277,34 @@ std::optional<Incarnation> RegistryState::FindFormer(const std::string& id,
 
 // Returns true if `change` is another version of the known hull, and applies it.
 bool RegistryState::ApplyPeerVersion(Locked& locked, const HullPointer& hull,
-                                     const PeerChange& change, bool is_new) {
+                                     const PeerChange& change) {
   if (!change.hull.has_value() || !change.hull->ok() || hull->state.damaged()) return false;
   const StoredHull& stored = **change.hull;
-  const HullRecord& before = hull->committed().record;
-  if (before.create_revision != stored.record.create_revision) return false;
+  if (hull->committed().record.create_revision != stored.record.create_revision) return false;
   // Applies even if the record is the same: an empty chunk advances its writer's sequence.
-  if (!is_cache_) {
-    NoteVertices(before.vertex_count, stored.record.vertex_count);
-  }
   const bool grew =
       hull->Supersede(locked, stored, change.growth.has_value() ? &*change.growth : nullptr);
   statistics.grown += grew;
   if (grew) PrepareIfWorn(hull);
   NoteChange(*hull);
-  if (is_new) feed.NotePresent(locked, Incarnation::Of(stored.record), hull, nullptr);
   return true;
 }
 
 // Ends the known hull, which was deleted or replaced.
 void RegistryState::EndFormer(Locked& locked, const HullPointer& former, const PeerChange& change) {
-  const HullRecord& record = former->committed().record;
-  if (!is_cache_) NoteVertices(record.vertex_count, 0);
   NoteChange(*former);
   former->Vanish();
-  Forget(locked, former, Gone(record.hull_id, change.hull.has_value() ? "replaced" : "deleted"));
+  Forget(
+      locked, former,
+      Gone(former->committed().record.hull_id, change.hull.has_value() ? "replaced" : "deleted"));
 }
 
 void RegistryState::ApplyPeerBody(Locked& locked, const std::string& id, const PeerChange& change) {
   const BodyTable::Entry* const entry = bodies.Find(id);
   HULLD_CHECK(entry == nullptr || !entry->in_flight);
   if (change.body.has_value()) {
-    if (!is_cache_ && entry == nullptr) ++kept_bodies_;
     AddBody(locked, id, *change.body);
   } else if (entry != nullptr) {
-    if (!is_cache_) --kept_bodies_;
     EraseBody(locked, id);
   }
 }
@@ -351,11 +327,6 @@ void RegistryState::Note(Locked& locked, const std::string& id, const PeerChange
     // A damaged record cannot be described.
     feed.NoteOther(locked, change.revision);
   }
-}
-
-void RegistryState::ApplyOther(Locked& locked, uint64_t revision) {
-  Publish(revision);
-  feed.NoteOther(locked, revision);
 }
 
 void RegistryState::Prepare(Locked& locked, RegisteredHull& hull) {

@@ -27,7 +27,7 @@ namespace hulld::server {
 
 // State shared by the parts of a registry, and its state machine. All parts read committed state
 // here. The Apply functions are the only ones that change what readers see. Each applies one
-// committed change, publishes its revision, and notes it in the feed. Never blocks.
+// committed change and notes it in the feed, which keeps the revision. Never blocks.
 //
 // Invariants:
 // - Revisions are applied in increasing order, and each change atomically, within one hold of the
@@ -41,16 +41,6 @@ namespace hulld::server {
 // - At most one thread prepares a hull, or is about to (RegisteredHull::is_preparing).
 class RegistryState {
  public:
-  // A committed chunk of a hull.
-  struct CommittedChunk {
-    // The hull with the chunk, and the prefix of its LiveHull.
-    const StoredHull& hull;
-    const LiveHull::Mark& mark;
-    const WriterSequence& writer;
-    // Number of points of the chunk that became vertices.
-    uint64_t vertices = 0;
-  };
-
   // preparers: metrics of the queue of hulls to prepare.
   RegistryState(Store& store, const Limits& limits, std::optional<PoolMetrics> preparers);
   RegistryState(const RegistryState&) = delete;
@@ -58,11 +48,8 @@ class RegistryState {
 
   // True if the tables cache records that the store can find.
   bool is_cache() const { return is_cache_; }
-  // Last committed and visible revision; 0 before Begin.
-  uint64_t revision() const { return revision_; }
-  // Starts at this revision of the store with empty tables. Existing hulls are read from `pages`.
-  // Must be called first.
-  void Begin(uint64_t revision, PageSource& pages);
+  // Last committed and visible revision; 0 before ChangeFeed::Begin.
+  uint64_t revision() const { return feed.revision(); }
 
   // Returns true if the ID's state is known, including absence. Cost: O(log n).
   bool IsKnown(const std::string& id) const { return hulls.Knows(id) || bodies.contains(id); }
@@ -78,14 +65,10 @@ class RegistryState {
 
   // Adds a stored hull, at rest or as damaged. Requires: the hull table has no hull with the ID.
   void AddStored(const std::string& id, const absl::StatusOr<StoredHull>& stored);
-  // Adds a body found in the store at Begin's revision, or logs that a hull has its ID.
-  void AddStoredBody(Locked& locked, const std::string& id,
-                     const absl::StatusOr<StoredBody>& stored);
-  // Replaces the known state of the body with the stored one.
+  // Replaces the known state of the body with the stored one. If a hull has the ID, which the
+  // server never writes, logs that instead: the hull takes precedence, because its vertices could
+  // not be restored.
   void AddBody(Locked& locked, const std::string& id, const absl::StatusOr<StoredBody>& stored);
-  // Logs that the store contains a body with the ID of a hull, which the server never writes. The
-  // hull takes precedence, because its vertices could not be restored.
-  static void LogBodyUnderHull(const std::string& id);
   // Removes a body. Requires: the body table has it.
   void EraseBody(Locked& locked, const std::string& id);
   // Marks a hull as damaged. Idempotent, because several threads may find the same damage.
@@ -94,9 +77,8 @@ class RegistryState {
   // Counts of hulls and bodies. Creations count from submission on, to enforce --max-hulls. These
   // functions take no lock.
   uint64_t HullCount() const {
-    return is_cache_ ? kept_hulls_.load(std::memory_order_relaxed) +
-                           creating_hulls_.load(std::memory_order_relaxed)
-                     : hulls.size();
+    return kept_hulls_.load(std::memory_order_relaxed) +
+           creating_hulls_.load(std::memory_order_relaxed);
   }
   uint64_t BodyCount() const {
     return kept_bodies_.load(std::memory_order_relaxed) +
@@ -106,7 +88,7 @@ class RegistryState {
   absl::Status CheckHullCount() const;
   // Returns the counts, excluding creations in flight.
   RegistrySizes Sizes() const;
-  // Sets the totals of the store at revision(). Requires is_cache().
+  // Sets the totals of the store at revision().
   void SetTotals(const StoreTotals& totals);
 
   // Count a creation at its submission, and at its commit or refusal. A refused hull is forgotten.
@@ -121,7 +103,9 @@ class RegistryState {
   void ApplyCreation(Locked& locked, const HullPointer& former, const HullPointer& hull,
                      const StoredHull& stored);
   void ApplyDeletion(Locked& locked, const HullPointer& hull, uint64_t revision);
-  void ApplyChunk(Locked& locked, const HullPointer& hull, const CommittedChunk& chunk);
+  // mark, points: as for RegisteredHull::Commit.
+  void ApplyChunk(Locked& locked, const HullPointer& hull, const Change& chunk,
+                  const LiveHull::Mark& mark, uint64_t points);
   // body: null after a deletion. Requires an entry for the ID.
   void ApplyBody(Locked& locked, const std::string& id, const std::shared_ptr<const Body>& body,
                  uint64_t revision);
@@ -130,8 +114,6 @@ class RegistryState {
   // ended, whose waiting tasks must resume; null if there is none.
   HullPointer ApplyPeerChange(Locked& locked, const std::string& id, const PeerChange& change,
                               uint64_t since);
-  // Applies a revision whose change cannot be described.
-  void ApplyOther(Locked& locked, uint64_t revision);
 
   // Prepares the committed state of a hull, after queries have paid for it (WantsPreparing), on
   // this thread. Releases the mutex. Requires: the hull has points in memory, and no thread
@@ -157,7 +139,6 @@ class RegistryState {
   ChangeFeed feed;
 
  private:
-  void Publish(uint64_t revision);
   // Records a reader-visible change of the hull.
   void NoteChange(const RegisteredHull& hull);
   // Updates the vertex total after a hull's count changed.
@@ -167,20 +148,19 @@ class RegistryState {
   // Prepares the hull before it contains too many points that are no longer vertices.
   void PrepareIfWorn(const HullPointer& hull);
 
+  StoreTotals TotalsOf(const std::string& id);
   std::optional<Incarnation> FindFormer(const std::string& id, const PeerChange& change,
                                         uint64_t since);
-  bool ApplyPeerVersion(Locked& locked, const HullPointer& hull, const PeerChange& change,
-                        bool is_new);
+  bool ApplyPeerVersion(Locked& locked, const HullPointer& hull, const PeerChange& change);
   void EndFormer(Locked& locked, const HullPointer& former, const PeerChange& change);
   void ApplyPeerBody(Locked& locked, const std::string& id, const PeerChange& change);
   void Note(Locked& locked, const std::string& id, const PeerChange& change,
             const std::optional<Incarnation>& former);
 
   const bool is_cache_;
-  uint64_t revision_ = 0;
   uint64_t vertex_count_ = 0;
-  // Numbers of hulls and bodies in the store at revision_ (hulls: only if the table is a cache),
-  // and of uncommitted creations. Changed under the mutex.
+  // Numbers of hulls and bodies in the store at revision(), and of uncommitted creations. Changed
+  // under the mutex.
   std::atomic<uint64_t> kept_hulls_ = 0;
   std::atomic<uint64_t> creating_hulls_ = 0;
   std::atomic<uint64_t> kept_bodies_ = 0;

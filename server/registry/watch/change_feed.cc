@@ -191,8 +191,8 @@ void ChangeFeed::NoteFor(Locked& locked, const std::shared_ptr<WatchGroup>& grou
   const auto [place, is_new] = group->revision_of.emplace(id, revision);
   if (is_new) {
     changes.emplace_hint(changes.end(), revision, WatchGroup::Pending{id, {}, 0});
-    Charge(group->bytes, group->bytes + WatchGroup::BytesOf(id));
     group->bytes += WatchGroup::BytesOf(id);
+    charge_.Set(charge_.bytes() + WatchGroup::BytesOf(id));
   } else {
     auto node = changes.extract(std::exchange(place->second, revision));
     const bool was_deletion = node.mapped().is_deletion();
@@ -241,33 +241,26 @@ std::shared_ptr<WatchGroup> ChangeFeed::GroupOf(const WatchTarget& target) {
 void ChangeFeed::RemoveGroup(const std::shared_ptr<WatchGroup>& group) {
   DropChanges(*group);
   const WatchTarget& target = group->target;
-  for (const std::string& id : target.ids) RemoveId(id, group);
+  for (const std::string& id : target.ids) Remove(by_id_, id, group);
   if (!target.ids.empty()) return;
-  const auto found = by_prefix_.find(target.prefix);
-  std::erase(found->second, group);
-  if (found->second.empty()) by_prefix_.erase(found);
+  Remove(by_prefix_, target.prefix, group);
   const auto length = prefix_lengths_.find(target.prefix.size());
   if (--length->second == 0) prefix_lengths_.erase(length);
 }
 
-void ChangeFeed::RemoveId(const std::string& id, const std::shared_ptr<WatchGroup>& group) {
-  const auto found = by_id_.find(id);
-  HULLD_CHECK(found != by_id_.end());
+void ChangeFeed::Remove(GroupsByName& groups, const std::string& name,
+                        const std::shared_ptr<WatchGroup>& group) {
+  const auto found = groups.find(name);
+  HULLD_CHECK(found != groups.end());
   std::erase(found->second, group);
-  if (found->second.empty()) by_id_.erase(found);
+  if (found->second.empty()) groups.erase(found);
 }
 
 void ChangeFeed::DropChanges(WatchGroup& group) {
-  Charge(group.bytes, 0);
-  group.bytes = 0;
+  charge_.Set(charge_.bytes() - std::exchange(group.bytes, 0));
   group.changes.clear();
   group.revision_of.clear();
   group.deletions = 0;
-}
-
-void ChangeFeed::Charge(uint64_t before, uint64_t now) {
-  bytes_ += now - before;
-  charge_.Set(bytes_);
 }
 
 absl::StatusOr<std::shared_ptr<Watch>> ChangeFeed::Open(const WatchTarget& target,
@@ -323,7 +316,7 @@ void ChangeFeed::ChangeIds(Watch& watch, std::span<const std::string> added,
   });
   in_slices(removed, [&](const std::string& id) {
     HULLD_CHECK(group->target.ids.erase(id) == 1);
-    RemoveId(id, group);
+    Remove(by_id_, id, group);
   });
 }
 

@@ -162,17 +162,6 @@ class Watch {
   bool is_nudged_ = false;
 };
 
-// A hull or body from its creation or replacement to its end.
-struct Incarnation {
-  static Incarnation Of(const HullRecord& record) { return {record.create_revision, false}; }
-  static Incarnation Of(const BodyRecord& record) { return {record.create_revision, true}; }
-
-  uint64_t create_revision = 0;
-  bool is_body = false;
-
-  bool operator==(const Incarnation&) const = default;
-};
-
 // The most recent deletions of hulls and bodies, in the order of their revisions, for watches that
 // resume: a deletion leaves no trace in the store. Not thread-safe.
 class DeletionLog {
@@ -251,6 +240,8 @@ class ChangeFeed {
   // Begins at the revision of the loaded store. Existing hulls are read from `pages`. Call before
   // all other functions.
   void Begin(uint64_t revision, PageSource& pages);
+  // Revision of the last noted change. Requires the mutex.
+  uint64_t revision() const { return revision_; }
 
   // Note a committed change at the revision of its record, or at `revision`. body: null for a
   // change of a hull. former: the incarnation that had the ID before, possibly the same one;
@@ -311,9 +302,9 @@ class ChangeFeed {
 
   std::shared_ptr<WatchGroup> GroupOf(const WatchTarget& target);
   void RemoveGroup(const std::shared_ptr<WatchGroup>& group);
-  void RemoveId(const std::string& id, const std::shared_ptr<WatchGroup>& group);
+  static void Remove(GroupsByName& groups, const std::string& name,
+                     const std::shared_ptr<WatchGroup>& group);
   void DropChanges(WatchGroup& group);
-  void Charge(uint64_t before, uint64_t now);
 
   bool IsLost(const Watch& watch) const;
   void Restart(Watch& watch);
@@ -344,8 +335,7 @@ class ChangeFeed {
   std::map<size_t, size_t> prefix_lengths_;
   GroupsByName by_id_;
   Watch::Set watches_;
-  // Bytes of all pending changes.
-  uint64_t bytes_ = 0;
+  // Covers all pending changes.
   MemoryCharge charge_;
 
   // Input of the thread.

@@ -22,7 +22,7 @@ using Clock = std::chrono::steady_clock;
 // A database contains one store, so the channel's name need not identify it.
 constexpr char kListen[] = "LISTEN hulld_batches";
 constexpr char kNotify[] = "NOTIFY hulld_batches";
-constexpr std::chrono::milliseconds kForEver{-1};
+constexpr std::chrono::milliseconds kForever{-1};
 // Retry delay after the database refused to listen.
 constexpr std::chrono::minutes kRefusedRetry{1};
 
@@ -87,7 +87,7 @@ absl::Status BatchNotices::Serve() {
   // From here on, each later batch arrives as a notice.
   HULLD_ASSIGN_OR_RETURN(const uint64_t last, LastBatch(session));
   is_listening_ = true;
-  Hear(last);
+  NoteReceived(last);
   Clock::time_point next = Clock::now();
   while (true) {
     // Cleared before the conditions are checked, so later events wake the thread again.
@@ -101,17 +101,17 @@ absl::Status BatchNotices::Serve() {
     }
     // Notices also arrive with the answers to queries.
     for (const std::string& payload : session.TakeNotices()) {
-      uint64_t heard = 0;
-      if (absl::SimpleAtoi(payload, &heard)) Hear(heard);
+      uint64_t received = 0;
+      if (absl::SimpleAtoi(payload, &received)) NoteReceived(received);
     }
-    const auto longest = to_send_ == sent_ ? kForEver : UpTo(next);
+    const auto longest = to_send_ == sent_ ? kForever : UpTo(next);
     HULLD_RETURN_IF_ERROR(session.AwaitNotices(wake_, longest));
   }
 }
 
-void BatchNotices::Hear(uint64_t batch) {
+void BatchNotices::NoteReceived(uint64_t batch) {
   // Notices from two servers may arrive in a different order than their commits.
-  last_heard_ = std::max(last_heard_.load(), batch);
+  last_received_ = std::max(last_received_.load(), batch);
   on_batch_(batch);
 }
 

@@ -52,15 +52,15 @@ class BatchNotices {
   // Schedules a notice of this committed batch to all servers. Any thread. Cost: a system call.
   void Send(uint64_t batch);
 
-  // is_listening: true if the session exists, as far as is known. last_heard: the last batch
+  // is_listening: true if the session exists, as far as is known. last_received: the last batch
   // received.
   bool is_listening() const { return is_listening_; }
-  uint64_t last_heard() const { return last_heard_; }
+  uint64_t last_received() const { return last_received_; }
 
  private:
   void Run();
   absl::Status Serve();
-  void Hear(uint64_t batch);
+  void NoteReceived(uint64_t batch);
   void AwaitRetry(std::chrono::milliseconds pause) const;
   void ClearWake() const;
 
@@ -74,7 +74,7 @@ class BatchNotices {
   // The last batch to send.
   std::atomic<uint64_t> to_send_ = 0;
   std::atomic<bool> is_listening_ = false;
-  std::atomic<uint64_t> last_heard_ = 0;
+  std::atomic<uint64_t> last_received_ = 0;
   // Used only by the thread. The last batch sent.
   uint64_t sent_ = 0;
   std::thread thread_;

@@ -52,7 +52,7 @@ absl::Status PostgresStore::Superseded(std::string_view owner) {
                    ": this server exits without changing anything; connect to the other one"));
 }
 
-void PostgresStore::Keep() {
+void PostgresStore::RunKeeper() {
   bool failing = false;
   int silent_heartbeats = 0;
   bool reported_silence = false;
@@ -66,7 +66,7 @@ void PostgresStore::Keep() {
     if (keeper_session_ == nullptr && !is_heartbeat) continue;
     lock.unlock();
     if (is_heartbeat) {
-      const bool is_silent = notices_ != nullptr && notices_->is_listening() && !HearsPeers();
+      const bool is_silent = notices_ != nullptr && notices_->is_listening() && !ReceivesNotices();
       silent_heartbeats = is_silent ? silent_heartbeats + 1 : 0;
       reported_silence = reported_silence && is_silent;
     }
@@ -78,9 +78,11 @@ void PostgresStore::Keep() {
           options_.poll_interval.count());
     }
     absl::Status status;
-    if (is_heartbeat) status = Beat();
+    if (is_heartbeat) status = CheckActive();
     if (status.ok() && is_heartbeat && options_.shared) status = EndStuckTransactions();
-    if (status.ok() && options_.shared && (is_heartbeat || !HearsPeers())) status = PollPeers();
+    if (status.ok() && options_.shared && (is_heartbeat || !ReceivesNotices())) {
+      status = PollPeers();
+    }
     if (status.ok() && poll % (polls_per_heartbeat * kHeartbeatsPerMeasure) == 0)
       status = MeasureDisk();
     if (!status.ok()) {
@@ -98,7 +100,7 @@ void PostgresStore::Keep() {
   }
 }
 
-absl::Status PostgresStore::Beat() {
+absl::Status PostgresStore::CheckActive() {
   if (keeper_session_ == nullptr) {
     HULLD_ASSIGN_OR_RETURN(keeper_session_, OpenKeeper());
   }

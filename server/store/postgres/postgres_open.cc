@@ -220,7 +220,7 @@ absl::StatusOr<std::unique_ptr<PostgresStore>> PostgresStore::Open(PostgresOptio
       store->synchronous_commit_, shared ? "peer servers may be active; " : "", store->epoch());
   store->MeasureDisk().IgnoreError();
   if (shared && store->options_.notices) store->StartNotices();
-  store->keeper_ = std::thread([raw = store.get()] { raw->Keep(); });
+  store->keeper_ = std::thread([raw = store.get()] { raw->RunKeeper(); });
   return store;
 }
 
@@ -255,9 +255,9 @@ absl::Status PostgresStore::BeginPatiently() {
 // Opens the sessions needed for loading.
 absl::Status PostgresStore::OpenFirstReaders() {
   const Statement owner = {.name = "hulld_owner"};
-  const absl::Status status = readers_.Ask(std::span(&owner, 1)).status();
+  const absl::Status status = readers_.Execute(std::span(&owner, 1)).status();
   if (!status.ok() || !options_.shared) return status;
-  return follower_.Ask(std::span(&owner, 1)).status();
+  return follower_.Execute(std::span(&owner, 1)).status();
 }
 
 absl::StatusOr<std::unique_ptr<Session>> PostgresStore::OpenSession(
@@ -360,12 +360,11 @@ absl::Status PostgresStore::RenewWriter() {
 
 // Runs a claim and reads the state of the store from the first columns of the returned row.
 absl::StatusOr<Rows> PostgresStore::Claim(Statement claim) {
-  absl::StatusOr<Rows> rows = writer_->Ask(std::move(claim));
+  absl::StatusOr<Rows> rows = writer_->Execute(std::move(claim));
   if (!rows.ok()) return rows;
   if (rows->count() != 1) return absl::DataLossError("the row of hulld.store is missing");
   epoch_ = rows->bigint(0, 0);
   batch_ = rows->bigint(0, 1);
-  seen_batch_ = batch_;
   revision_ = rows->bigint(0, 2);
   id_ = std::string(rows->at(0, 3));
   totals_ = {rows->bigint(0, 4), rows->bigint(0, 5), rows->bigint(0, 6)};

@@ -17,7 +17,7 @@ namespace {
 constexpr uint32_t kRowsPerPortion = 4096;
 
 // Selects the deltas of a hull after one revision and up to another.
-Statement AskForDeltas(const HullRecord& hull, uint64_t after, uint64_t up_to) {
+Statement SelectDeltas(const HullRecord& hull, uint64_t after, uint64_t up_to) {
   return {.name = "hulld_deltas",
           .parameters = {hull.hull_id, EncodeBigint(hull.create_revision), EncodeBigint(after),
                          EncodeBigint(up_to)}};
@@ -71,7 +71,7 @@ std::optional<std::vector<Vector>> PointsOf(const Rows& deltas, const HullGrowth
 absl::StatusOr<std::vector<Rows>> PostgresStore::Read(std::vector<Statement> statements) {
   HULLD_RETURN_IF_ERROR(ended());
   statements.push_back({.name = "hulld_owner"});
-  absl::StatusOr<std::vector<Rows>> rows = readers_.Ask(statements);
+  absl::StatusOr<std::vector<Rows>> rows = readers_.Execute(statements);
   if (!rows.ok()) {
     ++read_failures_;
     return absl::UnavailableError(
@@ -119,10 +119,10 @@ absl::Status PostgresStore::ForEachBody(const StoredBodyVisitor& visit) {
 }
 
 absl::StatusOr<FoundRecords> PostgresStore::FindRecords(std::span<const std::string> ids) {
-  ArrayParameter asked(ArrayParameter::Element::kText);
-  for (const std::string& id : ids) asked.Add(id);
+  ArrayParameter id_array(ArrayParameter::Element::kText);
+  for (const std::string& id : ids) id_array.Add(id);
   HULLD_ASSIGN_OR_RETURN(const Rows rows,
-                         ReadOne({.name = "hulld_find", .parameters = {asked.Take()}}));
+                         ReadOne({.name = "hulld_find", .parameters = {id_array.Take()}}));
   return FoundIn(rows, "", SIZE_MAX);
 }
 
@@ -149,7 +149,7 @@ absl::StatusOr<std::vector<Vector>> PostgresStore::LoadVertices(const StoredHull
       Read(
           {{.name = "hulld_base",
             .parameters = {id, EncodeBigint(incarnation), EncodeBigint(hull.layout.base_revision)}},
-           AskForDeltas(hull.record, hull.layout.base_revision, hull.record.revision)}));
+           SelectDeltas(hull.record, hull.layout.base_revision, hull.record.revision)}));
   const Rows& base = rows[0];
   const Rows& deltas = rows[1];
   VertexAssembly assembly(hull);
@@ -168,7 +168,7 @@ absl::StatusOr<std::vector<Vector>> PostgresStore::LoadVertices(const StoredHull
   }
   absl::StatusOr<std::vector<Vector>> vertices = std::move(assembly).Finish(std::move(status));
   if (!options_.shared || !absl::IsDataLoss(vertices.status())) return vertices;
-  return WhyDamaged(hull, vertices.status());
+  return ExplainDamage(hull, vertices.status());
 }
 
 // The data may be newer than the requested versions, and then does not match them.
@@ -178,9 +178,9 @@ std::vector<std::optional<std::vector<Vector>>> PostgresStore::LoadGrowth(
   std::vector<Statement> statements;
   for (const HullGrowth& hull : hulls) {
     statements.push_back(
-        AskForDeltas(hull.after.record, hull.before.record.revision, hull.after.record.revision));
+        SelectDeltas(hull.after.record, hull.before.record.revision, hull.after.record.revision));
   }
-  const absl::StatusOr<std::vector<Rows>> rows = follower_.Ask(statements);
+  const absl::StatusOr<std::vector<Rows>> rows = follower_.Execute(statements);
   if (!rows.ok()) {
     ++read_failures_;
     return growth;

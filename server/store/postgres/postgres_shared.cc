@@ -96,15 +96,14 @@ Statement FetchStatement(uint64_t batch) {
           .parameters = {EncodeBigint(batch), EncodeBigint(kMaxFollowed + 1)}};
 }
 
-// Records the first incarnation that ended. rows: the result of hulld_follow.
-void NoteFormer(const Rows& rows, int row, PeerChange& change) {
+// Returns the first incarnation that ended, if any. rows: the result of hulld_follow.
+std::optional<Incarnation> FormerIn(const Rows& rows, int row) {
   const auto began = [&](int column) {
     return rows.at(row, column).empty() ? UINT64_MAX : rows.bigint(row, column);
   };
   const uint64_t first = std::min(began(13), began(14));
-  if (first == UINT64_MAX) return;
-  change.former_began = first;
-  change.former_was_body = first == began(14);
+  if (first == UINT64_MAX) return std::nullopt;
+  return Incarnation{first, first == began(14)};
 }
 
 absl::Status Moved() { return absl::AbortedError("a peer server changed the hull"); }
@@ -144,13 +143,13 @@ absl::Status PostgresStore::Join() {
         "stop one hulld with --postgres-servers one first, which gives the store a new ID");
   }
   // Drops killed servers. A server that may still query its last batch committed it recently.
-  return writer_->Ask({.name = "hulld_drop_old_servers"}).status();
+  return writer_->Execute({.name = "hulld_drop_old_servers"}).status();
 }
 
 // Removes this server's last batch, which is not needed after an orderly end.
 void PostgresStore::Leave() {
   if (writer_ == nullptr) return;
-  writer_->Ask({.name = "hulld_drop_server", .parameters = {owner_}}).status().IgnoreError();
+  writer_->Execute({.name = "hulld_drop_server", .parameters = {owner_}}).status().IgnoreError();
 }
 
 // Ends this server if changes that it needs were pruned, the store has another owner, or the store
@@ -190,7 +189,7 @@ absl::Status PostgresStore::NotePeerChanges(const Rows& rows) {
     PeerChange& change = peer_changes_.by_id[id];
     change.revision = rows.bigint(i, 6);
     change.ended_at = std::max(change.ended_at, rows.bigint(i, 7));
-    if (change.former_began == 0) NoteFormer(rows, i, change);
+    if (!change.former.has_value()) change.former = FormerIn(rows, i);
     change.hull.reset();
     change.body.reset();
     if (!rows.at(i, 8).empty()) {
@@ -202,7 +201,6 @@ absl::Status PostgresStore::NotePeerChanges(const Rows& rows) {
     }
   }
   batch_ = rows.bigint(0, 0);
-  seen_batch_ = batch_;
   revision_ = rows.bigint(0, 1);
   totals_ = {rows.bigint(0, 11), rows.bigint(0, 12), rows.bigint(0, 15)};
   if (peer_changes_.by_id.empty()) return absl::OkStatus();
@@ -218,15 +216,15 @@ void PostgresStore::StartFetch() {
 }
 
 absl::Status PostgresStore::Fetch() {
-  std::unique_ptr<Session> asked = std::exchange(fetching_, nullptr);
+  std::unique_ptr<Session> started = std::exchange(fetching_, nullptr);
   if (absl::Status s = ended(); !s.ok()) {
-    follower_.GiveUp(std::move(asked));
+    follower_.Drop(std::move(started));
     return s;
   }
   const Statement fetch = FetchStatement(batch_);
   const absl::StatusOr<std::vector<Rows>> rows =
-      asked != nullptr ? follower_.Finish(std::move(asked), std::span(&fetch, 1))
-                       : follower_.Ask(std::span(&fetch, 1));
+      started != nullptr ? follower_.Finish(std::move(started), std::span(&fetch, 1))
+                         : follower_.Execute(std::span(&fetch, 1));
   if (rows.ok()) {
     const absl::Status noted = NotePeerChanges(rows->front());
     if (went_back_) GiveNewId();
@@ -243,7 +241,7 @@ absl::Status PostgresStore::Fetch() {
 // the batch that may have been committed if the session is lost.
 absl::Status PostgresStore::AttemptShared(std::span<Change* const> changes, Batch* batch) {
   const Statement locking[] = {{.text = "BEGIN"}, {.name = "hulld_lock"}, FetchStatement(batch_)};
-  const absl::StatusOr<std::vector<Rows>> before = writer_->Ask(locking);
+  const absl::StatusOr<std::vector<Rows>> before = writer_->Execute(locking);
   const absl::Status status = before.ok() ? NotePeerChanges(before->back()) : before.status();
   std::vector<Change*> kept;
   for (Change* change : changes) {
@@ -274,8 +272,9 @@ void PostgresStore::GiveNewId() {
   went_back_ = false;
   const absl::StatusOr<std::unique_ptr<Session>> session = OpenWriter();
   const absl::Status status =
-      session.ok() ? (*session)->Ask({.name = "hulld_rename", .parameters = {RandomId()}}).status()
-                   : session.status();
+      session.ok()
+          ? (*session)->Execute({.name = "hulld_rename", .parameters = {RandomId()}}).status()
+          : session.status();
   if (!status.ok())
     spdlog::error("cannot assign a new ID to the store: {}", std::string(status.message()));
 }
@@ -289,7 +288,7 @@ absl::StatusOr<bool> PostgresStore::SharedOutcome(uint64_t batch) {
                                   {.name = "hulld_touch", .parameters = {EncodeBigint(epoch())}},
                                   {.name = "hulld_server", .parameters = {owner_}},
                                   {.text = "COMMIT"}};
-  HULLD_ASSIGN_OR_RETURN(const std::vector<Rows> rows, writer_->AskToCommit(statements));
+  HULLD_ASSIGN_OR_RETURN(const std::vector<Rows> rows, writer_->ExecuteCommit(statements));
   const Rows& last = rows[2];
   return last.count() == 1 && last.bigint(0, 0) == batch;
 }
@@ -310,7 +309,7 @@ absl::Status PostgresStore::EndStuckTransactions() {
 
 void PostgresStore::StartNotices() {
   const auto on_batch = [this](uint64_t batch) {
-    if (batch > seen_batch_) NotifyPeerCommit();
+    if (batch > batch_) NotifyPeerCommit();
   };
   notices_ = std::make_unique<BatchNotices>(
       [this] { return OpenListener(); }, options_.heartbeat, on_batch,
@@ -320,15 +319,16 @@ void PostgresStore::StartNotices() {
 // True if notices arrive. The keeper still polls the store with each heartbeat. A batch found by
 // polling but not announced by then means that a notice was lost; the keeper then polls more often
 // until a notice arrives.
-bool PostgresStore::HearsPeers() const {
-  return notices_ != nullptr && notices_->is_listening() && notices_->last_heard() >= looked_at_;
+bool PostgresStore::ReceivesNotices() const {
+  return notices_ != nullptr && notices_->is_listening() &&
+         notices_->last_received() >= polled_batch_;
 }
 
 // Polls for new commits of peer servers, and reports them.
 absl::Status PostgresStore::PollPeers() {
   HULLD_ASSIGN_OR_RETURN(const uint64_t batch, LastBatch(*keeper_session_));
-  looked_at_ = batch;
-  if (batch != seen_batch_) NotifyPeerCommit();
+  polled_batch_ = batch;
+  if (batch != batch_) NotifyPeerCommit();
   return absl::OkStatus();
 }
 
@@ -351,7 +351,7 @@ absl::Status PostgresStore::CheckRecord(const HullRecord& hull, const Rows& rows
 }
 
 // Explains vertices that contradict the record. ABORTED: a peer server changed the hull since.
-absl::Status PostgresStore::WhyDamaged(const StoredHull& hull, const absl::Status& damage) {
+absl::Status PostgresStore::ExplainDamage(const StoredHull& hull, const absl::Status& damage) {
   HULLD_ASSIGN_OR_RETURN(const Rows rows,
                          ReadOne({.name = "hulld_record", .parameters = {hull.record.hull_id}}));
   if (rows.count() == 0) return Moved();

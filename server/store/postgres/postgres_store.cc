@@ -58,7 +58,7 @@ PostgresStore::~PostgresStore() {
 // The sync of this statement covers earlier commits. If it fails, the mark stays.
 void PostgresStore::EndRelaxedRun() {
   if (writer_ == nullptr || !writer_->Run("SET synchronous_commit = on").ok()) return;
-  writer_->Ask({.name = "hulld_close", .parameters = {EncodeBigint(epoch())}})
+  writer_->Execute({.name = "hulld_close", .parameters = {EncodeBigint(epoch())}})
       .status()
       .IgnoreError();
 }
@@ -90,9 +90,9 @@ absl::Status PostgresStore::Attempt(std::span<Change* const> changes, Batch* bat
 // Sends the last statements of a transaction, and COMMIT.
 absl::Status PostgresStore::SendBatch(std::vector<Statement> statements, const Batch& batch) {
   statements.push_back({.text = "COMMIT"});
-  const absl::Status status = writer_->AskToCommit(statements).status();
+  const absl::Status status = writer_->ExecuteCommit(statements).status();
   if (status.ok()) {
-    Keep(batch);
+    NoteCommitted(batch);
   } else {
     EndTransaction(status);
   }
@@ -117,20 +117,19 @@ absl::StatusOr<bool> PostgresStore::FindOutcome(uint64_t batch, Clock::time_poin
     }
     // A server that is the only active one can determine the outcome even after it was superseded.
     if (options_.shared && !ended().ok()) return outcome;
-    if (Clock::now() + pause >= deadline || EndsWithin(pause)) return outcome;
+    if (Clock::now() + pause >= deadline || AwaitEnd(pause)) return outcome;
   }
 }
 
 // Waits; returns true if this server ends during the wait.
-bool PostgresStore::EndsWithin(std::chrono::milliseconds pause) {
+bool PostgresStore::AwaitEnd(std::chrono::milliseconds pause) {
   std::unique_lock lock(mutex_);
   return wake_.wait_for(lock, pause, [this] { return ending_; });
 }
 
 // Records a committed batch.
-void PostgresStore::Keep(const Batch& batch) {
+void PostgresStore::NoteCommitted(const Batch& batch) {
   batch_ = batch.number;
-  seen_batch_ = batch_;
   revision_ = batch.revision;
   totals_ = {totals_.hulls + batch.added.hulls, totals_.vertices + batch.added.vertices,
              totals_.bodies + batch.added.bodies};
@@ -143,7 +142,7 @@ absl::StatusOr<bool> PostgresStore::Reclaim(uint64_t batch) {
   HULLD_RETURN_IF_ERROR(RenewWriter());
   const Statement reclaim = {.name = "hulld_reclaim", .parameters = {owner_}};
   HULLD_ASSIGN_OR_RETURN(const std::vector<Rows> rows,
-                         writer_->AskToCommit(std::span(&reclaim, 1)));
+                         writer_->ExecuteCommit(std::span(&reclaim, 1)));
   const Rows& claimed = rows.front();
   if (claimed.count() == 0) return OutcomeBeforePeers(batch);
   epoch_ = claimed.bigint(0, 0);
@@ -153,7 +152,7 @@ absl::StatusOr<bool> PostgresStore::Reclaim(uint64_t batch) {
   // earlier state. It will assign their revisions to other changes, so this is now a different
   // store.
   HULLD_RETURN_IF_ERROR(
-      writer_->Ask({.name = "hulld_rename", .parameters = {RandomId()}}).status());
+      writer_->Execute({.name = "hulld_rename", .parameters = {RandomId()}}).status());
   End(absl::UnavailableError(
       absl::StrCat("the database has lost ", batch_ - found,
                    " batches committed by this server (failover to a lagging standby, a restored "
@@ -164,8 +163,9 @@ absl::StatusOr<bool> PostgresStore::Reclaim(uint64_t batch) {
 
 // The first epoch after this server's records the number of batches at its start.
 absl::StatusOr<bool> PostgresStore::OutcomeBeforePeers(uint64_t batch) {
-  HULLD_ASSIGN_OR_RETURN(const Rows next, writer_->Ask({.name = "hulld_next_epoch",
-                                                        .parameters = {EncodeBigint(epoch())}}));
+  HULLD_ASSIGN_OR_RETURN(
+      const Rows next,
+      writer_->Execute({.name = "hulld_next_epoch", .parameters = {EncodeBigint(epoch())}}));
   if (next.count() == 0) {
     End(
         absl::UnavailableError("the database was restored to a state before this server became "
@@ -208,12 +208,12 @@ absl::Status PostgresStore::Commit(std::span<Change* const> changes) {
       spdlog::warn("lost the database connection during COMMIT ({}); the batch was {}",
                    std::string(status.message()), *committed ? "committed" : "not committed");
       if (*committed) {
-        Keep(batch);
+        NoteCommitted(batch);
         return absl::OkStatus();
       }
       if (absl::Status s = ended(); !s.ok()) return WriteFailed(s);
     }
-    if (Clock::now() + pause >= deadline || EndsWithin(pause)) return WriteFailed(Refused(status));
+    if (Clock::now() + pause >= deadline || AwaitEnd(pause)) return WriteFailed(Refused(status));
   }
 }
 

@@ -185,8 +185,8 @@ class PostgresStore : public Store, public PeerFeed {
   absl::StatusOr<bool> CheckFormat(Session& session) const;
   absl::StatusOr<bool> TryLock(Session& session) const;
   absl::StatusOr<std::string> Owner(Session& session) const;
-  void Keep();
-  absl::Status Beat();
+  void RunKeeper();
+  absl::Status CheckActive();
   absl::Status MeasureDisk();
   void End(const absl::Status& reason);
   // Returns the reason that this is not the active server. owner: the active server, if known.
@@ -198,9 +198,9 @@ class PostgresStore : public Store, public PeerFeed {
   absl::Status Attempt(std::span<Change* const> changes, Batch* batch);
   absl::Status SendBatch(std::vector<Statement> statements, const Batch& batch);
   void EndTransaction(const absl::Status& status);
-  void Keep(const Batch& batch);
+  void NoteCommitted(const Batch& batch);
   absl::StatusOr<bool> FindOutcome(uint64_t batch, std::chrono::steady_clock::time_point deadline);
-  bool EndsWithin(std::chrono::milliseconds pause);
+  bool AwaitEnd(std::chrono::milliseconds pause);
   absl::StatusOr<bool> Reclaim(uint64_t batch);
   absl::StatusOr<bool> OutcomeBeforePeers(uint64_t batch);
   absl::Status WriteFailed(const absl::Status& status);
@@ -221,11 +221,11 @@ class PostgresStore : public Store, public PeerFeed {
   absl::StatusOr<bool> SharedOutcome(uint64_t batch);
   absl::Status EndStuckTransactions();
   void StartNotices();
-  bool HearsPeers() const;
+  bool ReceivesNotices() const;
   absl::Status PollPeers();
   void NotifyPeerCommit();
   static absl::Status CheckRecord(const HullRecord& hull, const Rows& rows);
-  absl::Status WhyDamaged(const StoredHull& hull, const absl::Status& damage);
+  absl::Status ExplainDamage(const StoredHull& hull, const absl::Status& damage);
 
   // Visits every row of a table, in byte order of the IDs: its ID and its sealed value.
   absl::Status ForEachRow(const char* statement,
@@ -249,11 +249,9 @@ class PostgresStore : public Store, public PeerFeed {
 
   // For Commit, Recover, and shutdown, which never overlap.
   std::unique_ptr<Session> writer_;
-  // Number of committed batches, as far as is known.
-  uint64_t batch_ = 0;
-  // Shared: batch_ for the keeper, and the changes of peer servers up to it that TakeChanges has
-  // not returned yet.
-  std::atomic<uint64_t> seen_batch_ = 0;
+  // Number of committed batches, as far as is known. Read by the keeper and the notices, too.
+  std::atomic<uint64_t> batch_ = 0;
+  // Shared: the changes of peer servers up to that batch that TakeChanges has not returned yet.
   PeerChanges peer_changes_;
   // Shared: a started query for Fetch to finish; null: it must send one.
   std::unique_ptr<Session> fetching_;
@@ -282,7 +280,7 @@ class PostgresStore : public Store, public PeerFeed {
   std::unique_ptr<Session> keeper_session_;
   bool has_lock_ = false;
   // Shared: the last batch found by the keeper.
-  uint64_t looked_at_ = 0;
+  uint64_t polled_batch_ = 0;
   // Shared: created before the keeper starts.
   std::unique_ptr<BatchNotices> notices_;
   std::thread keeper_;

@@ -242,7 +242,7 @@ absl::Status Session::Send(const Statement& statement) {
   return absl::OkStatus();
 }
 
-absl::StatusOr<std::vector<Rows>> Session::Ask(std::span<const Statement> statements) {
+absl::StatusOr<std::vector<Rows>> Session::Execute(std::span<const Statement> statements) {
   HULLD_RETURN_IF_ERROR(Start(statements));
   return Finish();
 }
@@ -305,19 +305,20 @@ std::vector<std::string> Session::TakeNotices() {
   }
 }
 
-absl::StatusOr<Rows> Session::Ask(Statement statement) {
-  HULLD_ASSIGN_OR_RETURN(std::vector<Rows> rows, Ask(std::span<const Statement>(&statement, 1)));
+absl::StatusOr<Rows> Session::Execute(Statement statement) {
+  HULLD_ASSIGN_OR_RETURN(std::vector<Rows> rows,
+                         Execute(std::span<const Statement>(&statement, 1)));
   return std::move(rows.front());
 }
 
-absl::StatusOr<std::vector<Rows>> Session::AskToCommit(std::span<const Statement> statements) {
+absl::StatusOr<std::vector<Rows>> Session::ExecuteCommit(std::span<const Statement> statements) {
   warned_ = false;
-  absl::StatusOr<std::vector<Rows>> rows = Ask(statements);
+  absl::StatusOr<std::vector<Rows>> rows = Execute(statements);
   if (rows.ok() && warned_) return Lost("PostgreSQL reported a warning during COMMIT");
   return rows;
 }
 
-absl::StatusOr<std::vector<Rows>> SessionPool::Ask(std::span<const Statement> statements) {
+absl::StatusOr<std::vector<Rows>> SessionPool::Execute(std::span<const Statement> statements) {
   HULLD_ASSIGN_OR_RETURN(std::unique_ptr<Session> session, Take(false));
   // Finish reports a lost session.
   session->Start(statements).IgnoreError();
@@ -345,7 +346,7 @@ absl::StatusOr<std::vector<Rows>> SessionPool::Finish(std::unique_ptr<Session> s
     GiveBack(is_lost ? nullptr : std::move(session));
     if (!is_lost || !again) break;
     HULLD_ASSIGN_OR_RETURN(session, Take(true));
-    rows = session->Ask(statements);
+    rows = session->Execute(statements);
   }
   return rows;
 }

@@ -72,7 +72,7 @@ class Rows {
   explicit Rows(PGresult* result) : result_(result, PQclear) {}
 
   int count() const { return PQntuples(result_.get()); }
-  // The value as received: text from Run, binary from Ask.
+  // The value as received: text from Run, binary from Execute.
   std::string_view at(int row, int column) const {
     return {PQgetvalue(result_.get(), row, column),
             static_cast<size_t>(PQgetlength(result_.get(), row, column))};
@@ -105,10 +105,10 @@ class Session {
   absl::StatusOr<Rows> Run(const std::string& text);
   // Runs all statements in one round trip. The first failure ends it, and is the error; an open
   // transaction then stays open, but cannot be committed.
-  absl::StatusOr<std::vector<Rows>> Ask(std::span<const Statement> statements);
-  absl::StatusOr<Rows> Ask(Statement statement);
-  // The two halves of Ask: send and receive. Start does not block; Finish must be the next call, on
-  // any thread.
+  absl::StatusOr<std::vector<Rows>> Execute(std::span<const Statement> statements);
+  absl::StatusOr<Rows> Execute(Statement statement);
+  // The two halves of Execute: send and receive. Start does not block; Finish must be the next
+  // call, on any thread.
   absl::Status Start(std::span<const Statement> statements);
   absl::StatusOr<std::vector<Rows>> Finish();
 
@@ -118,9 +118,9 @@ class Session {
   // Returns the payloads of the notices (LISTEN) received since the last call.
   std::vector<std::string> TakeNotices();
 
-  // Like Ask for statements that commit. A warning counts as a loss: for example, the wait for a
-  // standby was interrupted, so the transaction is committed, but not replicated as required.
-  absl::StatusOr<std::vector<Rows>> AskToCommit(std::span<const Statement> statements);
+  // Like Execute for statements that commit. A warning counts as a loss: for example, the wait for
+  // a standby was interrupted, so the transaction is committed, but not replicated as required.
+  absl::StatusOr<std::vector<Rows>> ExecuteCommit(std::span<const Statement> statements);
   // Returns the version of the server: 150018 for 15.18.
   int server_version() const { return PQserverVersion(connection_.get()); }
   // Describes the location without secrets: "database hulld at db.example".
@@ -150,18 +150,18 @@ class SessionPool {
   // open: creates a session. most: maximum number of sessions; a thread waits if all are in use.
   SessionPool(Opener open, int most) : open_(std::move(open)), most_(most) {}
 
-  // Session::Ask on one of the sessions. If it was lost since its last use, for example by a
+  // Session::Execute on one of the sessions. If it was lost since its last use, for example by a
   // restart of the database, retries once on a new one.
-  absl::StatusOr<std::vector<Rows>> Ask(std::span<const Statement> statements);
+  absl::StatusOr<std::vector<Rows>> Execute(std::span<const Statement> statements);
 
-  // The two halves of Ask. TryStart does not block: returns null if no session is idle. A started
-  // query must be finished or dropped, on any thread, before the next one if there is only one
-  // session.
+  // The two halves of Execute. TryStart does not block: returns null if no session is idle. A
+  // started query must be finished or dropped, on any thread, before the next one if there is only
+  // one session.
   std::unique_ptr<Session> TryStart(std::span<const Statement> statements);
   // statements: as passed to TryStart.
   absl::StatusOr<std::vector<Rows>> Finish(std::unique_ptr<Session> session,
                                            std::span<const Statement> statements);
-  void GiveUp(std::unique_ptr<Session> session) {
+  void Drop(std::unique_ptr<Session> session) {
     if (session != nullptr) GiveBack(nullptr);
   }
 

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "server/process/shared_loop.h"
+#include "server/process/parallel_loop.h"
 
 namespace hulld::server {
 namespace task_pool_test {
@@ -226,11 +226,11 @@ TEST(TaskPool, TasksOfLastActionsFollowQueuedTasks) {
   EXPECT_THAT(order.names(), ElementsAre("first", "second", "last"));
 }
 
-TEST(SharedLoop, RunsEachOnce) {
+TEST(ParallelLoop, RunsEachOnce) {
   TaskPool helpers(3);
   for (const size_t count : {0, 1, 7, 8, 9, 1000}) {
     std::vector<std::atomic<int>> runs(count);
-    SharedLoop::Run(helpers, 3, count, 8, [&](size_t begin, size_t end) {
+    ParallelLoop::Run(helpers, 3, count, 8, [&](size_t begin, size_t end) {
       EXPECT_LE(end - begin, 8u);
       for (size_t i = begin; i < end; ++i) ++runs[i];
     });
@@ -238,23 +238,23 @@ TEST(SharedLoop, RunsEachOnce) {
   }
 }
 
-TEST(SharedLoop, DoesNotWaitForBusyThreads) {
+TEST(ParallelLoop, DoesNotWaitForBusyThreads) {
   TaskPool helpers(1);
   std::promise<void> free;
   helpers.Submit([ready = free.get_future().share()] { ready.wait(); });
   int runs = 0;
-  SharedLoop::Run(helpers, 1, 100, 10, [&](size_t, size_t) { ++runs; });
+  ParallelLoop::Run(helpers, 1, 100, 10, [&](size_t, size_t) { ++runs; });
   EXPECT_EQ(runs, 10);
   free.set_value();
 }
 
-TEST(SharedLoop, WaitsForWorkStartedByAnotherThread) {
+TEST(ParallelLoop, WaitsForWorkStartedByAnotherThread) {
   TaskPool helpers(1);
   std::promise<void> both;
   std::atomic<int> running = 0;
   std::atomic<int> ended = 0;
   const std::shared_future<void> ready = both.get_future().share();
-  SharedLoop::Run(helpers, 1, 2, 1, [&, ready](size_t, size_t) {
+  ParallelLoop::Run(helpers, 1, 2, 1, [&, ready](size_t, size_t) {
     if (++running == 2) both.set_value();
     ready.wait();
     ++ended;

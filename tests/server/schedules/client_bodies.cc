@@ -11,9 +11,9 @@ namespace {
 
 using State = Ledger::State;
 
-bool IsOf(const State& state, const BodyRecord& record) {
-  return state.is_body && state.record.create_revision == record.create_revision &&
-         state.record.revision == record.revision;
+bool IsOf(const State& state, const HullChange& body) {
+  return state.is_body && state.record.create_revision == body.record.create_revision &&
+         state.record.revision == body.record.revision;
 }
 
 }  // namespace
@@ -69,7 +69,7 @@ void Client::PutBody() {
     }
     const auto state = ledger().Find(call.hull, call.since,
                                      [&](const State& one) { return IsOf(one, result->body); });
-    const std::string what = absl::StrCat("put a body at ", result->body.revision);
+    const std::string what = absl::StrCat("put a body at ", result->body.record.revision);
     if (!state.has_value()) Fail(call, absl::StrCat(what, ", but the store has no such body"));
     if (!ledger().Claim(call.hull, *state))
       Fail(call, absl::StrCat(what, ", but another call made that change"));
@@ -117,9 +117,7 @@ void Client::DeleteBody() {
 void Client::CheckBody(const Call& call, std::optional<uint64_t> revision,
                        const std::optional<HullChange>& body) {
   const auto is_it = [&](const State& state) {
-    return !body.has_value()
-               ? !state.is_body
-               : IsOf(state, {{}, body->record.create_revision, body->record.revision});
+    return body.has_value() ? IsOf(state, *body) : !state.is_body;
   };
   const auto state = revision.has_value() ? ledger().FindAt(call.hull, call.since, *revision, is_it)
                                           : ledger().Find(call.hull, call.since, is_it);

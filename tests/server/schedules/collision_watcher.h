@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "server/collisions/watch/watched_hulls.h"
+#include "server/collisions/watched_hulls.h"
 #include "tests/server/schedules/simulation.h"
 
 namespace hulld::server {

@@ -2,8 +2,6 @@
 
 #include <absl/status/status.h>
 
-#include <optional>
-
 #include "tests/server/schedules/scheduler.h"
 
 namespace hulld::server {
@@ -208,8 +206,12 @@ void SimulatedStore::Reopen(const StoreFaults& faults) {
 
 void SimulatedStore::KeepBody(const Change& change) {
   const BodyRecord& record = change.body->record;
-  log_.push_back({record.body_id, change.revision, change.deleted ? change.revision : 0,
-                  change.deleted ? record.create_revision : 0, true});
+  Logged logged = {record.body_id, change.revision};
+  if (change.deleted) {
+    logged.ended_at = change.revision;
+    if (record.create_revision != 0) logged.former = Incarnation::Of(record);
+  }
+  log_.push_back(std::move(logged));
   if (change.deleted) {
     bodies_.erase(record.body_id);
   } else {
@@ -221,11 +223,13 @@ void SimulatedStore::Keep(const Change& change, bool nobody_waits) {
   if (auto fault = ledger_.Keep(change, nobody_waits)) Scheduler::Current().Fail(*fault);
   if (change.body != nullptr) return KeepBody(change);
   const HullRecord& record = change.hull.record;
-  const bool ends = change.deleted || change.replaced.has_value();
-  const uint64_t began = change.deleted                ? record.create_revision
-                         : change.replaced.has_value() ? change.replaced->record.create_revision
-                                                       : 0;
-  log_.push_back({record.hull_id, change.revision, ends ? change.revision : 0, began, false});
+  Logged logged = {record.hull_id, change.revision};
+  if (change.deleted || change.replaced.has_value()) {
+    const HullRecord& ended = change.deleted ? record : change.replaced->record;
+    logged.ended_at = change.revision;
+    if (ended.create_revision != 0) logged.former = Incarnation::Of(ended);
+  }
+  log_.push_back(std::move(logged));
   if (change.deleted) {
     hulls_.erase(record.hull_id);
     return;

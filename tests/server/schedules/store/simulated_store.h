@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -111,9 +112,7 @@ class SimulatedStore : public Store {
     std::string hull_id;
     uint64_t revision = 0;
     uint64_t ended_at = 0;
-    // First revision of that incarnation; and true if it was a body's.
-    uint64_t former_began = 0;
-    bool former_was_body = false;
+    std::optional<Incarnation> former = {};
   };
 
   absl::Status RefuseBatch(std::span<const Change* const> changes);

@@ -250,15 +250,15 @@ TEST_F(PostgresShared, BodiesAndHullsShareTheirIdsAcrossServers) {
   const auto put = PutBody(*hulls_, "b");
   ASSERT_TRUE(put.ok()) << put.status();
   EXPECT_TRUE(absl::IsAlreadyExists(other->Create("b").status()));
-  const auto again = PutBody(*other, "b", put->body.revision);
+  const auto again = PutBody(*other, "b", put->body.record.revision);
   ASSERT_TRUE(again.ok()) << again.status();
   EXPECT_FALSE(again->created);
-  EXPECT_EQ(again->body.create_revision, put->body.create_revision);
-  EXPECT_TRUE(absl::IsAborted(PutBody(*hulls_, "b", put->body.revision).status()));
+  EXPECT_EQ(again->body.record.create_revision, put->body.record.create_revision);
+  EXPECT_TRUE(absl::IsAborted(PutBody(*hulls_, "b", put->body.record.revision).status()));
   ASSERT_TRUE(hulls_->registry().peers().AwaitPeers({}).ok());
   const std::string id = "b";
   EXPECT_EQ(hulls_->registry().records().FindBodies(std::span(&id, 1)).bodies[0]->record().revision,
-            again->body.revision);
+            again->body.record.revision);
   const auto deleted = PostgresRegistry::Wait<uint64_t>([&](Reply<uint64_t> done) {
     hulls_->registry().changes().Delete("body", "b", std::nullopt, std::move(done));
   });

@@ -1,4 +1,4 @@
-#include "server/collisions/watch/watched_hulls.h"
+#include "server/collisions/watched_hulls.h"
 
 #include <algorithm>
 #include <string_view>

@@ -1,5 +1,5 @@
-#ifndef HULLD_SERVER_COLLISIONS_WATCH_WATCHED_HULLS_H_
-#define HULLD_SERVER_COLLISIONS_WATCH_WATCHED_HULLS_H_
+#ifndef HULLD_SERVER_COLLISIONS_WATCHED_HULLS_H_
+#define HULLD_SERVER_COLLISIONS_WATCHED_HULLS_H_
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
@@ -103,4 +103,4 @@ class WatchedHulls {
 
 }  // namespace hulld::server
 
-#endif  // HULLD_SERVER_COLLISIONS_WATCH_WATCHED_HULLS_H_
+#endif  // HULLD_SERVER_COLLISIONS_WATCHED_HULLS_H_

@@ -1,5 +1,5 @@
-#ifndef HULLD_SERVER_PROCESS_SHARED_LOOP_H_
-#define HULLD_SERVER_PROCESS_SHARED_LOOP_H_
+#ifndef HULLD_SERVER_PROCESS_PARALLEL_LOOP_H_
+#define HULLD_SERVER_PROCESS_PARALLEL_LOOP_H_
 
 #include <algorithm>
 #include <atomic>
@@ -16,7 +16,7 @@
 namespace hulld::server {
 
 // A loop over [0, count) shared by several threads: each takes the next `step` indices.
-class SharedLoop {
+class ParallelLoop {
  public:
   // Several threads call it concurrently.
   using Work = std::function<void(size_t begin, size_t end)>;
@@ -28,23 +28,23 @@ class SharedLoop {
   static void Run(TaskPool& helpers, size_t max_helpers, size_t count, size_t step, Work work,
                   const std::function<bool()>& should_stop = {}) {
     HULLD_CHECK(step > 0);
-    const auto loop = std::make_shared<SharedLoop>(count, step, std::move(work));
+    const auto loop = std::make_shared<ParallelLoop>(count, step, std::move(work));
     const size_t steps = (count + step - 1) / step;
     for (size_t i = 1; i < steps && i <= max_helpers; ++i) {
-      helpers.Submit([loop] { loop->TakePart({}); });
+      helpers.Submit([loop] { loop->RunSteps({}); });
     }
-    loop->TakePart(should_stop);
+    loop->RunSteps(should_stop);
     std::unique_lock lock(loop->mutex_);
     while (loop->done_ < count) loop->all_done_.wait(lock);
   }
 
   // For Run.
-  SharedLoop(size_t count, size_t step, Work work)
+  ParallelLoop(size_t count, size_t step, Work work)
       : count_(count), step_(step), work_(std::move(work)) {}
 
  private:
   // Works until no step is left.
-  void TakePart(const std::function<bool()>& should_stop) {
+  void RunSteps(const std::function<bool()>& should_stop) {
     for (size_t begin = next_.fetch_add(step_); begin < count_; begin = next_.fetch_add(step_)) {
       const size_t end = std::min(count_, begin + step_);
       if (!is_stopped_) work_(begin, end);
@@ -68,4 +68,4 @@ class SharedLoop {
 
 }  // namespace hulld::server
 
-#endif  // HULLD_SERVER_PROCESS_SHARED_LOOP_H_
+#endif  // HULLD_SERVER_PROCESS_PARALLEL_LOOP_H_

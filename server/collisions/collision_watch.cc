@@ -1,5 +1,3 @@
-#include "server/collisions/watch/collision_watch.h"
-
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
 #include <grpcpp/grpcpp.h>
@@ -18,12 +16,13 @@
 #include "hulld/v1/collision.pb.h"
 #include "server/call/queued_stream.h"
 #include "server/call/service_parts.h"
+#include "server/collisions/collision_service.h"
 #include "server/collisions/placed/live_pairs.h"
 #include "server/collisions/placed/placed_answer.h"
 #include "server/collisions/placed/placement_table.h"
 #include "server/collisions/placed/query_settings.h"
 #include "server/collisions/placed/scene_groups.h"
-#include "server/collisions/watch/watched_hulls.h"
+#include "server/collisions/watched_hulls.h"
 #include "server/contract/errors.h"
 #include "server/process/task_pool.h"
 #include "server/settings/config.h"
@@ -33,13 +32,11 @@ namespace hulld::server {
 namespace {
 
 // Pairs between two reads of the clock.
-constexpr size_t kPairsPerPoll = 16;
+constexpr size_t kWatchedPairsPerPoll = 16;
 // Rounds per watch, over which preparation pays off; a guess.
 constexpr uint64_t kExpectedRounds = 256;
 // Tag and length of an entry within its message.
 constexpr size_t kEntryHeaderBytes = 4;
-// Decoding the poses of an update up to this size takes less than a slice.
-constexpr int kMaxShortUpdate = 4096;
 
 bool IsContact(v1::Relation relation) {
   return relation == v1::RELATION_TOUCHING || relation == v1::RELATION_OVERLAPPING;
@@ -164,11 +161,11 @@ class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchC
     const auto on_ready = [this, self = shared_from_this()] {
       Locked([this] { has_changes_ = true; });
     };
-    const auto should_stop = [this] { return call().ShouldStop(); };
     HULLD_ASSIGN_OR_RETURN(
         WatchedHulls::Round round,
         hulls_.Open(table_.hull_ids(), on_ready,
-                    table_.LookupFor(options_, {kExpectedRounds * per_hull, true}), should_stop));
+                    table_.LookupFor(options_, {kExpectedRounds * per_hull, true}),
+                    call().should_stop()));
     Locked([this] { has_changes_ = true; });
     table_.SetHulls(parts_.store, std::move(round.resolved), options_);
     revision_ = round.revision;
@@ -200,8 +197,7 @@ class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchC
   }
 
   void TakeChanges() {
-    absl::StatusOr<WatchedHulls::Round> round =
-        hulls_.TakeChanges([this] { return call().ShouldStop(); });
+    absl::StatusOr<WatchedHulls::Round> round = hulls_.TakeChanges(call().should_stop());
     if (!round.ok()) return EndWork(round.status());
     if (round->waits) return EndWork(absl::OkStatus());
     // More changes may be pending.
@@ -259,7 +255,7 @@ class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchC
       const absl::Status status = AnswerPair(pairs_.pair(selected[next_pair_++]));
       if (!status.ok()) return EndWork(status);
       is_full = reply_bytes_ >= Config::kReplyMessageBytes;
-      if (!table_.has_bodies() && next_pair_ % kPairsPerPoll != 0) continue;
+      if (!table_.has_bodies() && next_pair_ % kWatchedPairsPerPoll != 0) continue;
       if (call().ShouldStop()) return EndWork(call().StopStatus());
       if (std::chrono::steady_clock::now() >= end) return RunOn(lane_, [this] { SendRound(); });
     }
@@ -313,7 +309,7 @@ class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchC
       pair.is_within_clearance = false;
       return absl::OkStatus();
     }
-    const PlacedAnswer found = AskAtRest(table_, pair.a, pair.b, options_, &pair.cache);
+    const PlacedAnswer found = QueryAtRest(table_, pair.a, pair.b, options_, &pair.cache);
     const absl::StatusOr<Answer>& answer = found.answer;
     if (!answer.ok()) return answer.status();
     rungs_.Add(answer->rung);
