@@ -510,7 +510,8 @@ absl::StatusOr<FirstContact> TurningSearch::ConcludeStuck() {
     if (*tolerable == 1) return WithoutContact(Relation::kWithinTolerance);
   }
   return absl::InvalidArgumentError(
-      "no separation can be proven between pose and end_pose: a rotation nearly vanishes (add a pose "
+      "no separation can be proven between pose and end_pose: a rotation nearly vanishes (add a "
+      "pose "
       "between them), or coordinates or translations exceed 2^900 or are all below 2^-700 (rescale "
       "them)");
 }
