@@ -47,7 +47,7 @@ Client::PointFeed FeedOf(const ReadRequest& request) {
 
 // Sets `points` to the vertices of the hull of a file.
 absl::Status ReadVertices(const ReadRequest& request, v1::PointBlock* points) {
-  const auto mesh = HullBuilder().Build(FeedOf(request));
+  const auto mesh = LocalHullBuilder().Build(FeedOf(request));
   if (!mesh.ok()) {
     return absl::Status(mesh.status().code(),
                         absl::StrCat(request.path, " has more than ", kMaxShapePoints,
@@ -97,11 +97,11 @@ absl::StatusOr<HullMesh> HullOfFile(const std::string& path) {
   HULLD_ASSIGN_OR_RETURN(const auto format, PointFormatOfPath(path));
   ReadRequest request{path, format, {}, {}};
   request.options.skip_nonfinite = true;
-  return HullBuilder().Build(FeedOf(request));
+  return LocalHullBuilder().Build(FeedOf(request));
 }
 
 absl::StatusOr<std::vector<HullMesh>> HullsOfShapes(const std::vector<v1::PointBlock>& shapes) {
-  HullBuilder builder;
+  LocalHullBuilder builder;
   std::vector<HullMesh> hulls;
   for (const v1::PointBlock& shape : shapes) {
     HULLD_ASSIGN_OR_RETURN(

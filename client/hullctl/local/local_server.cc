@@ -164,7 +164,7 @@ LocalServer::~LocalServer() {
   if (log_reader_.joinable()) log_reader_.join();
 }
 
-absl::StatusOr<HullMesh> HullBuilder::Build(const Client::PointFeed& feed) {
+absl::StatusOr<HullMesh> LocalHullBuilder::Build(const Client::PointFeed& feed) {
   if (!client_.has_value()) {
     HULLD_ASSIGN_OR_RETURN(server_, LocalServer::Start());
     ClientOptions options;

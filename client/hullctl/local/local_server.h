@@ -44,7 +44,7 @@ class LocalServer {
 };
 
 // Builds hulls on a private server, which the first hull starts.
-class HullBuilder {
+class LocalHullBuilder {
  public:
   // Returns the hull of the points. Errors of LocalServer::Start and of the server.
   absl::StatusOr<HullMesh> Build(const Client::PointFeed& feed);

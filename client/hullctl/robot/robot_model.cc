@@ -120,7 +120,7 @@ void KeepDistinctPoints(std::vector<double>* xyz) {
 }
 
 // Turns the hull of a mesh into an inline shape.
-absl::Status ReduceToVertices(const Invocation& run, HullBuilder* builder, RobotPart* part) {
+absl::Status ReduceToVertices(const Invocation& run, LocalHullBuilder* builder, RobotPart* part) {
   KeepDistinctPoints(&part->hull.xyz);
   const bool is_small = part->hull.xyz.size() <= 3 * kMaxShapePoints;
   if (is_small && part->mesh.triangles.empty()) return absl::OkStatus();
@@ -206,7 +206,7 @@ absl::StatusOr<RobotModel> ReadRobot(const RobotArguments& arguments) {
 absl::Status PrepareHulls(const Invocation& run, const RobotArguments& arguments,
                           const Client& client, RobotModel* model) {
   const bool registers = run.local || !arguments.prefix.empty();
-  HullBuilder builder;
+  LocalHullBuilder builder;
   std::set<std::string> taken;
   for (RobotPart& part : model->parts) {
     if (registers) {
