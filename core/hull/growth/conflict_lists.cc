@@ -150,9 +150,9 @@ void ConflictLists::Distribute(std::span<const TriangleId> targets, bool has_ver
 // Fills matches_, block by block of the sources, with indices of targets or kBelowAll.
 //
 // The limits of a plane are offset + bound and offset - bound. Rounding them errs by at most 6 u
-// |e||f| |corner|, which the slack of kPlaneErrorFactor covers. In an exact plane, only points
-// equal to a vertex need a test of their own. If only the apex comes into question, an inexact
-// plane, if there is one, finds these points uncertain.
+// |e||f| |corner|, which the slack of kPlaneErrorFactor covers. With slope 0, the test is exact: a
+// point of the plane is not above it, and only duplicates of vertices need MatchExactly, which
+// counts them. Duplicates of the apex lie in all target planes, so any inexact one finds them.
 void ConflictLists::Match(std::span<const TriangleId> targets, bool has_vertices) {
   const double size = surface_.SizeWith(vertices_, Vector::Constant(size_));
   const bool are_exact = std::all_of(targets.begin(), targets.end(), [this](TriangleId id) {

@@ -40,7 +40,7 @@ inline void SetPlane(SurfaceTriangle& t, const Vector& a, const Vector& b, const
   t.normal = Cross(e, f);
   t.offset = t.normal.dot(a);
   t.slope = static_cast<float>(slope * kPlaneSlopeRoundUp);
-  // Of the normal of a plane perpendicular to an axis, two components are 0.
+  // The normal of a plane perpendicular to an axis has two zero components.
   if (t.normal.x() * t.normal.y() != 0) return;
   for (Eigen::Index k = 0; k < 3; ++k) {
     if (a[k] != b[k] || a[k] != c[k] || !(std::abs(t.normal[k]) > slope)) continue;

@@ -59,7 +59,7 @@ class LaneLookup {
   LaneIds upper_;
 };
 
-// The same as one permutation of two registers, which exists with AVX-512.
+// A LaneLookup by one permutation of two registers. Requires AVX-512VL.
 class LanePermutation {
  public:
   [[gnu::always_inline]] explicit LanePermutation(const LaneIds& index) : index_(index) {}

@@ -70,12 +70,12 @@ struct PostgresOptions {
 // keys.
 //
 // Unless shared, any number of servers may be started over one database; one is active, the rest
-// wait in Open. The active server holds an advisory lock in a dedicated session, which ends with
-// it, or soon after it stalls. That lock only decides the order of servers. Safety comes from the
-// epoch in the row of the store, which each server raises when it becomes active: every transaction
-// of a batch writes its own epoch next to it, and a table constraint rejects a mismatch. So a
-// superseded server cannot commit anything, whether or not it knows that it was superseded, and
-// neither can packets that arrive late.
+// wait in Open. The active server holds an advisory lock in a dedicated session. The session ends
+// with the server, or soon after the server stalls. The lock only decides the order of servers.
+// Safety comes from the epoch in the row of the store. Each server raises it when it becomes
+// active. Every transaction of a batch writes its own epoch next to it, and a table constraint
+// rejects a mismatch. So a superseded server cannot commit anything, even if it has not noticed,
+// and neither can packets that arrive late.
 //
 // A batch of changes is one transaction, sent in one message. If the session is lost before the
 // outcome is known, the store raises the epoch again in a new session. This waits for the
