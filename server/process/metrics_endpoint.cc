@@ -6,11 +6,17 @@
 
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/read_until.hpp>
 #include <boost/asio/steady_timer.hpp>
-#include <boost/beast/core.hpp>
-#include <boost/beast/http.hpp>
+#include <boost/asio/write.hpp>
+#include <boost/beast/core/tcp_stream.hpp>
+#include <boost/beast/http/empty_body.hpp>
+#include <boost/beast/http/parser.hpp>
+#include <boost/beast/http/status.hpp>
+#include <boost/beast/http/verb.hpp>
 #include <chrono>
-#include <optional>
+#include <memory>
+#include <string>
 #include <thread>
 #include <utility>
 
@@ -47,42 +53,49 @@ class Connection : public std::enable_shared_from_this<Connection> {
   ~Connection() { --connections_; }
 
   void Read() {
-    parser_.emplace();
-    parser_->header_limit(kMaxHeaderBytes);
-    parser_->body_limit(0);
     stream_.expires_after(kTimeout);
-    http::async_read(stream_, buffer_, *parser_,
-                     [self = shared_from_this()](error_code error, size_t /*size*/) {
-                       // Malformed or oversized requests get no answer.
-                       if (!error) self->Answer();
-                     });
+    asio::async_read_until(stream_, asio::dynamic_buffer(input_, kMaxHeaderBytes), "\r\n\r\n",
+                           [self = shared_from_this()](error_code error, size_t size) {
+                             if (!error) self->Answer(size);
+                           });
   }
 
  private:
-  void Answer() {
-    const auto& request = parser_->get();
-    const bool is_read =
-        request.method() == http::verb::get || request.method() == http::verb::head;
+  // Answers the first `size` bytes of input. Malformed requests and those with a body get no
+  // answer.
+  void Answer(size_t size) {
+    http::request_parser<http::empty_body> parser;
+    parser.body_limit(0);
+    error_code error;
+    parser.put(asio::buffer(input_.data(), size), error);
+    if (error) return;
+    input_.erase(0, size);
+    const auto& request = parser.get();
+    const bool is_head = request.method() == http::verb::head;
     const beast::string_view path = request.target().substr(0, request.target().find('?'));
-    if (!is_read) return Send(http::status::method_not_allowed, "Only GET is served.\n");
-    if (path != "/metrics") return Send(http::status::not_found, "Metrics are at /metrics.\n");
-    Send(http::status::ok, prometheus::TextSerializer().Serialize(metrics_.Collect()));
-  }
-
-  void Send(http::status status, std::string body) {
-    const auto& request = parser_->get();
-    response_ = {};
-    response_.result(status);
-    response_.keep_alive(request.keep_alive());
-    response_.set(http::field::content_type, "text/plain; version=0.0.4; charset=utf-8");
-    if (status == http::status::method_not_allowed) response_.set(http::field::allow, "GET, HEAD");
-    response_.body() = std::move(body);
-    response_.prepare_payload();
-    if (request.method() == http::verb::head) response_.body().clear();
+    http::status status = http::status::ok;
+    std::string body;
+    if (!is_head && request.method() != http::verb::get) {
+      status = http::status::method_not_allowed;
+      body = "Only GET is served.\n";
+    } else if (path != "/metrics") {
+      status = http::status::not_found;
+      body = "Metrics are at /metrics.\n";
+    } else {
+      body = prometheus::TextSerializer().Serialize(metrics_.Collect());
+    }
+    const bool keep_alive = request.keep_alive();
+    const beast::string_view reason = http::obsolete_reason(status);
+    reply_ = absl::StrCat(
+        "HTTP/1.1 ", static_cast<unsigned>(status), " ",
+        absl::string_view(reason.data(), reason.size()),
+        "\r\nContent-Type: text/plain; version=0.0.4; charset=utf-8\r\nAllow: GET, HEAD\r\n",
+        "Connection: ", keep_alive ? "keep-alive" : "close", "\r\nContent-Length: ", body.size(),
+        "\r\n\r\n", is_head ? "" : body);
     stream_.expires_after(kTimeout);
-    http::async_write(stream_, response_,
-                      [self = shared_from_this()](error_code error, size_t /*size*/) {
-                        if (!error && self->response_.keep_alive()) return self->Read();
+    asio::async_write(stream_, asio::buffer(reply_),
+                      [self = shared_from_this(), keep_alive](error_code failure, size_t /*size*/) {
+                        if (!failure && keep_alive) return self->Read();
                         error_code ignored;
                         self->stream_.socket().shutdown(tcp::socket::shutdown_send, ignored);
                       });
@@ -91,9 +104,8 @@ class Connection : public std::enable_shared_from_this<Connection> {
   beast::tcp_stream stream_;
   const Metrics& metrics_;
   size_t& connections_;
-  beast::flat_buffer buffer_{kMaxHeaderBytes};
-  std::optional<http::request_parser<http::empty_body>> parser_;
-  http::response<http::string_body> response_;
+  std::string input_;
+  std::string reply_;
 };
 
 // The port and its thread. All functions except constructor and destructor run on that thread.
