@@ -3,10 +3,11 @@
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
+#include <iostream>
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include "core/base/status_macros.h"
@@ -14,6 +15,7 @@
 #include "core/hull/growth/hull_builder.h"
 #include "server/process/log.h"
 #include "server/registry/memory/hull_loader.h"
+#include "server/settings/subcommand.h"
 #include "server/store/rocksdb_store.h"
 
 namespace hulld::server {
@@ -117,26 +119,24 @@ absl::Status AcceptLoss(RocksDbOptions options) {
 }  // namespace
 
 int RunDoctor(const std::vector<std::string>& arguments) {
-  CLI::App app("Audits every hull and body of a store that no hulld has open.", "hulld doctor");
   RocksDbOptions options;
   options.read_only = true;
   bool json = false;
   bool accept_loss = false;
-  app.add_option("--data-dir", options.data_dir, "Directory of the store")
-      ->envname("HULLD_DATA_DIR")
-      ->required();
-  app.add_flag("--json", json, "Print one JSON object");
-  app.add_flag("--accept-loss", accept_loss,
-               "Accept the loss of acknowledged changes if the log is damaged or truncated. The "
-               "store gets a new ID. Without this flag, nothing is changed");
-  app.footer(
+  const Subcommand command = {
+      "hulld doctor",
+      "Audits every hull and body of a store that no hulld has open.",
+      {{"--data-dir", &options.data_dir, "Directory of the store", "HULLD_DATA_DIR"},
+       {"--json", &json, "Print one JSON object"},
+       {"--accept-loss", &accept_loss,
+        "Accept the loss of acknowledged changes if the log is damaged or truncated. The store "
+        "gets a new ID. Without this flag, nothing is changed"}},
       "Exit status: 0 the store is sound, 1 it is damaged, 2 it could not be opened or the "
-      "arguments are wrong.");
-  std::vector<std::string> reversed(arguments.rbegin(), arguments.rend());
-  try {
-    app.parse(std::move(reversed));
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : kExitUsage;
+      "arguments are wrong."};
+  if (const std::optional<int> exit = command.Parse(arguments, std::cout, std::cerr)) return *exit;
+  if (options.data_dir.empty()) {
+    std::cerr << "hulld doctor: set --data-dir\n";
+    return kExitUsage;
   }
   absl::StatusOr<std::unique_ptr<RocksDbStore>> store = RocksDbStore::Open(options);
   if (accept_loss && absl::IsDataLoss(store.status())) {

@@ -1,8 +1,8 @@
 #include <absl/strings/str_cat.h>
 
-#include <CLI/CLI.hpp>
 #include <chrono>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -11,6 +11,7 @@
 #include "server/contract/errors.h"
 #include "server/migration/migration.h"
 #include "server/process/log.h"
+#include "server/settings/subcommand.h"
 #include "server/store/postgres/postgres_store.h"
 #include "server/store/rocksdb_store.h"
 
@@ -150,29 +151,22 @@ absl::Status Run(const Place& from, const Place& to, std::ostream& out, std::ost
 }  // namespace
 
 int RunMigrate(const std::vector<std::string>& arguments, std::ostream& out, std::ostream& err) {
-  CLI::App app(
-      "Copies a store and compares the copy with it. No hulld may have either store open. The "
-      "source is not changed.",
-      "hulld migrate");
   Place from;
   Place to;
-  app.add_option("--from-data-dir", from.data_dir, "The source: a directory of --store=rocksdb");
-  app.add_option("--from-postgres-conninfo-file", from.conninfo_file,
-                 "The source: a database of --store=postgres");
-  app.add_option("--to-data-dir", to.data_dir, "The destination: a directory, created if missing");
-  app.add_option("--to-postgres-conninfo-file", to.conninfo_file,
-                 "The destination: an empty database");
-  app.footer(
+  const Subcommand command = {
+      "hulld migrate",
+      "Copies a store and compares the copy with it. No hulld may have either store open. The "
+      "source is not changed.",
+      {{"--from-data-dir", &from.data_dir, "The source: a directory of --store=rocksdb"},
+       {"--from-postgres-conninfo-file", &from.conninfo_file,
+        "The source: a database of --store=postgres"},
+       {"--to-data-dir", &to.data_dir, "The destination: a directory, created if missing"},
+       {"--to-postgres-conninfo-file", &to.conninfo_file, "The destination: an empty database"}},
       "Run the same command again to resume an interrupted run. Revisions and writers' sequences "
       "are\nkept; the copy is a new store with its own ID.\n"
       "Exit status: 0 everything is copied and verified, 1 it failed and can be resumed, 2 it "
-      "was\nrefused, and nothing was changed.");
-  std::vector<std::string> reversed(arguments.rbegin(), arguments.rend());
-  try {
-    app.parse(std::move(reversed));
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error, out, err) == 0 ? 0 : kExitRefused;
-  }
+      "was\nrefused, and nothing was changed."};
+  if (const std::optional<int> exit = command.Parse(arguments, out, err)) return *exit;
   if (!from.is_one() || !to.is_one()) {
     err << "hulld migrate: set one source (--from-data-dir or --from-postgres-conninfo-file) and "
            "one destination (--to-data-dir or --to-postgres-conninfo-file)\n";
