@@ -2,6 +2,7 @@
 // scan, as Leica and CloudCompare write it. A file with a header is read as a table.
 #include <absl/strings/str_cat.h>
 
+#include <algorithm>
 #include <array>
 #include <optional>
 #include <string>
@@ -55,12 +56,37 @@ absl::Status AddPoint(const ByteSource& source, std::string_view line, PointColl
   return AddTextPoint(source, line, points);
 }
 
+// Counts the columns of the first row into *columns, which is 0 before it. A later row with a
+// further number is an error: a lost line end joins two rows. Words may follow in any number.
+absl::Status CheckColumns(const ByteSource& source, std::string_view row, size_t* columns) {
+  const auto is_separator = [](char c) {
+    return c == ' ' || c == ',' || c == ';' || (c >= '\t' && c <= '\r');
+  };
+  size_t found = 0;
+  std::string_view excess;
+  for (auto end = row.begin();; ++found) {
+    const auto begin = std::find_if_not(end, row.end(), is_separator);
+    if (begin == row.end()) break;
+    end = std::find_if(begin, row.end(), is_separator);
+    if (found == *columns) excess = row.substr(begin - row.begin(), end - begin);
+  }
+  if (*columns == 0) *columns = found;
+  double number = 0;
+  if (found == *columns || excess.empty() || ParseDouble(excess, &number) != NumberText::kNumber) {
+    return absl::OkStatus();
+  }
+  return source.ErrorAtLine(absl::StrCat("the row has ", Counted(found, "column"),
+                                         ", but the first row has ", *columns,
+                                         "; is a line end missing?"));
+}
+
 }  // namespace
 
 absl::Status ReadXyz(ByteSource* source, PointCollector* points) {
-  // Points of the current scan: the declared number, if any, and the number read.
+  // Points of the current scan: the declared number, if any, and the number read; and its columns.
   std::optional<uint64_t> declared;
   uint64_t found = 0;
+  size_t columns = 0;
   bool first = true;
   std::string first_row;
   std::optional<CsvLayout> commented;
@@ -87,11 +113,14 @@ absl::Status ReadXyz(ByteSource* source, PointCollector* points) {
     if ((first || is_complete) && ParseUnsigned(content, &count)) {
       declared = count;
       found = 0;
+      columns = 0;
     } else if (is_complete) {
       return source->ErrorAtLine(absl::StrCat("the scan has more lines than the ",
                                               Counted(*declared, "point"), " it declares"));
     } else if (absl::Status added = AddPoint(*source, content, points); !added.ok()) {
       return added;
+    } else if (absl::Status checked = CheckColumns(*source, content, &columns); !checked.ok()) {
+      return checked;
     } else {
       ++found;
     }

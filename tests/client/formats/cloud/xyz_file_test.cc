@@ -1,3 +1,5 @@
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_replace.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -37,6 +39,23 @@ TEST(PtsFile, FewerOrMorePointsThanDeclaredAreErrors) {
   EXPECT_EQ(ReadText("1 2 3\n5\n", PointFormat::kXyz).error(),
             "FILE:2: a point needs 3 coordinates, got 1");
   EXPECT_EQ(ReadText("1\n1 x 3 4\n", PointFormat::kXyz).error(), "FILE:2: \"x\" is not a number");
+}
+
+// The last row was read as 7 8 910.
+TEST(XyzFile, RowsThatALostLineEndJoinedAreErrors) {
+  for (const char* separator : {",", ";", "\t", "  ", ", "}) {
+    const auto read = [separator](const char* last) {
+      return ReadText(
+          absl::StrReplaceAll(absl::StrCat("1 2 3\n4 5 6\n", last, "\n"), {{" ", separator}}),
+          PointFormat::kXyz);
+    };
+    EXPECT_EQ(read("7 8 910 11 12").error(),
+              "FILE:3: the row has 5 columns, but the first row has 3; is a line end missing?");
+    EXPECT_EQ(read("7 8 9").counts.points, 3u) << separator;
+    EXPECT_EQ(read("7 8 9 a tree 1").counts.points, 3u) << separator;
+  }
+  // Scans may have different columns; rows may lack some.
+  EXPECT_EQ(ReadText("1\n1 2 3\n2\n1 2 3 4\n5 6 7\n", PointFormat::kXyz).counts.points, 3u);
 }
 
 }  // namespace xyz_file_test
