@@ -94,17 +94,9 @@ run_tests() {
   return $code
 }
 
-# Compiles every source of core and every public header by itself, because unity builds and
-# precompiled headers hide missing includes. A source of core includes its own header first, so of
-# core's headers only those without a source are compiled separately.
 check_includes() {
-  cmake --install build/release --component devel --prefix build/includes >/dev/null || return 1
-  local headers=$PWD/build/includes/include/hulld
-  { find core -name '*.cc' && cd "$headers" && find core client -name '*.h'; } |
-    while read -r file; do [[ $file == core/*.h && -e ${file%.h}.cc ]] || echo "$file"; done | sort |
-    xargs -P "$jobs" -I{} nice sh -c 'echo "#include \"{}\"" |
-      c++ -std=c++20 -fsyntax-only -I . -I "$1" -isystem /usr/include/eigen3 -x c++ - ||
-      { echo "{} lacks an include"; exit 255; }' _ "$headers"
+  cmake --install build/release --component devel --prefix build/includes >/dev/null &&
+    python3 tests/includes.py build/includes/include/hulld
 }
 
 # Tests leave a third of the processor idle, so a second check runs concurrently. in_background
