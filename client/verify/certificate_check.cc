@@ -37,7 +37,7 @@ absl::Status CheckVertex(uint32_t index, bool has_vertex, const v1::Vector3& ver
                          const ExactHull& hull, const std::string& name) {
   const std::span<const double> xyz = hull.xyz;
   if (index >= xyz.size() / 3 && hull.in_any_order) {
-    return ProofFails(absl::StrCat(name, " is none of the points of its inline shape"));
+    return ProofFails(absl::StrCat(name, " is not one of the points of its inline shape"));
   }
   if (index >= xyz.size() / 3) {
     return ProofFails(

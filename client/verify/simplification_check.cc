@@ -219,7 +219,7 @@ class AskedHull {
 };
 
 absl::Status CheckHeader(const v1::Simplification& asked, const HullMesh& simplified) {
-  if (!simplified.header.has_error()) return NotShown("the reply states no error");
+  if (!simplified.header.has_error()) return NotShown("the reply contains no error");
   const double error = simplified.header.error();
   if (std::isnan(error) || error < 0) {
     return NotShown(absl::StrCat("the error is ", Text(error), ", which is not a distance"));

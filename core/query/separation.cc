@@ -158,7 +158,7 @@ class SeparationSearch {
   }
 
  private:
-  static absl::Status Stopped() { return absl::CancelledError("stopped in a query"); }
+  static absl::Status Stopped() { return absl::CancelledError("the query was cancelled"); }
 
   // Returns true if separation <= clearance, if the relation or an infinite clearance shows it.
   std::optional<bool> KnownWithin(double clearance) const {

@@ -36,7 +36,7 @@ absl::Status WhyNoPiece(const Body& body, size_t hull, const absl::Status& cause
   }
   return WithReason(absl::NotFoundError(
                         absl::StrCat(QuotedBody(body_id), ": piece ", piece, ": ", cause.message(),
-                                     "; create it, or put the body without that piece")),
+                                     "; create it, or remove that piece from the body")),
                     v1::ERROR_REASON_PIECE_NOT_FOUND,
                     {{"body_id", body_id}, {"piece", uint64_t{piece}}, {"hull_id", hull_id}});
 }

@@ -105,8 +105,8 @@ void PrintLoadTable(const LoadArguments& arguments, const LoadResult& result, st
   }
   if (result.missed > 0) {
     table.Row(
-        {"missed",
-         absl::StrCat(result.missed, " requests were due but not sent; the rate was not reached")});
+        {"missed", absl::StrCat(result.missed,
+                                " requests were due but not sent; the rate was not sustained")});
   }
   for (size_t i = 0; succeeded > 0 && i < std::size(kPercentiles); ++i) {
     table.Row({absl::StrCat("latency ", kPercentileNames[i]),

@@ -451,7 +451,7 @@ void AddCheckCommand(Command program, Invocation* invocation) {
       {{"Do they collide?", "hullctl check arm box --pose-b 0.2,0,0"},
        {"How far apart are they, and where?",
         "hullctl check arm box --pose-b 0.2,0,0 --separation --witness"},
-       {"Which way out is the shortest?", "hullctl check arm box --separation --normal"},
+       {"Which way out is shortest?", "hullctl check arm box --separation --normal"},
        {"Are they within a centimeter?", "hullctl check arm box --clearance 0.01"},
        {"With a margin of 2 mm about the arm", "hullctl check arm box --radius-a 0.002"},
        {"Two files, without a server", "hullctl check a.stl b.stl --local"},

@@ -197,7 +197,7 @@ void AddContextCommand(Command program, Invocation* invocation) {
   OnGiven(use, invocation, arguments, Use, /*needs_server=*/false);
   Command list = command.AddCommand("list", "List the contexts");
   OnGiven(list, invocation, ListContexts, /*needs_server=*/false);
-  Command show = command.AddCommand("show", "Show the settings in force and the source of each");
+  Command show = command.AddCommand("show", "Show the effective settings and the source of each");
   show.AddText("NAME", &arguments->name, "Show the settings as with --context NAME")
       .Completes(ValueKind::kContext);
   OnGiven(show, invocation, arguments, Show, /*needs_server=*/false);

@@ -322,7 +322,7 @@ const char* FaultName(Fault fault) {
     case Fault::kMiss:
       return "miss";
     case Fault::kTouching:
-      return "touching mistaken";
+      return "touching";
     case Fault::kDistance:
       return "distance";
     case Fault::kDepth:

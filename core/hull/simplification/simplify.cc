@@ -43,7 +43,7 @@ absl::Status CheckTarget(const SimplifyTarget& target, size_t min_vertices) {
   return absl::OkStatus();
 }
 
-absl::Status Stopped() { return absl::CancelledError("stopped while simplifying"); }
+absl::Status Stopped() { return absl::CancelledError("the simplification was cancelled"); }
 
 // One call of SimplifyOutside, for a hull of dimension 2 or 3.
 class OutsideSearch {

@@ -134,7 +134,7 @@ BodySearch::BodySearch(const PlacedBody& a, const PlacedBody& b, const QueryOpti
 
 absl::StatusOr<bool> BodySearch::Advance(uint64_t steps) {
   for (; steps > 0 && !ended_; --steps) {
-    if (poll_.Step()) return absl::CancelledError("stopped in a query of bodies");
+    if (poll_.Step()) return absl::CancelledError("the query was cancelled");
     if (absl::Status s = found_ ? Prove() : Search(); !s.ok()) return s;
     ended_ = found_ && (!options_->want_certificate || (certification_ && certification_->ended()));
   }

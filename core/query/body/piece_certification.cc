@@ -90,8 +90,8 @@ absl::Status PieceCertification::FindPairs(uint32_t piece_a) {
   if (pairs_.size() <= most_) return absl::OkStatus();
   return absl::ResourceExhaustedError(
       absl::StrCat("more than ", most_,
-                   " pairs of pieces are so close that each needs a certificate; use bodies of "
-                   "fewer pieces, or ask without certificates"));
+                   " pairs of pieces are so close that each needs a certificate; use bodies with "
+                   "fewer pieces, or do not request certificates"));
 }
 
 absl::Status PieceCertification::Certify(PiecePair pieces) {

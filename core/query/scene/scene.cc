@@ -61,7 +61,8 @@ class Search {
           if (pairs_.size() == kMaxEmittedAnswers && !AskAndEmit(emit)) break;
         }
       }
-      if (Stopped() || !AskAndEmit(emit)) return absl::CancelledError("stopped in a scene");
+      if (Stopped() || !AskAndEmit(emit))
+        return absl::CancelledError("the scene query was cancelled");
       const uint64_t candidates = std::max<uint64_t>(totals_.candidates - before, 1);
       width = static_cast<uint32_t>(std::clamp<uint64_t>(kCandidatesPerWindow * size / candidates,
                                                          1, std::min(2 * size, kMaxPlacements)));
@@ -217,7 +218,7 @@ absl::StatusOr<SceneSearch> SceneSearch::MakeWith(std::span<const PlacedHull> pl
   } else {
     is_made = scene.ComputeBoxes();
   }
-  if (!is_made || !scene.BuildTree()) return absl::CancelledError("stopped in a scene");
+  if (!is_made || !scene.BuildTree()) return absl::CancelledError("the scene query was cancelled");
   return scene;
 }
 

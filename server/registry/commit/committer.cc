@@ -186,7 +186,7 @@ void Committer::Settle(Round& round, const absl::Status& status, const absl::Sta
   if (was_written) {
     const std::lock_guard lock(mutex_);
     if (!status.ok() && !statistics_.failing) {
-      spdlog::error("changes refused: {}", std::string(status.message()));
+      spdlog::error("a batch of changes could not be committed: {}", std::string(status.message()));
     }
     statistics_.failing = !status.ok();
     if (status.ok()) {

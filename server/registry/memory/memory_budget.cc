@@ -136,14 +136,13 @@ absl::Status MemoryBudget::Check(Locked& owners, MemoryUse use) {
   Evict(owners);
   if (!IsOver(use)) return absl::OkStatus();
   const MemoryStatistics now = Statistics();
-  const std::string what =
-      use == MemoryUse::kReading
-          ? absl::StrCat(
-                "readers use ", now.reading_bytes,
-                " bytes of memory for hulls in use, streams, and watches, more than their share")
-          : absl::StrCat(
-                "writers use ", now.writing_bytes,
-                " bytes of memory for changing hulls and points in flight, more than their share");
+  const std::string what = use == MemoryUse::kReading
+                               ? absl::StrCat("readers use ", now.reading_bytes,
+                                              " bytes of memory for hulls in use, streams, and "
+                                              "watches, which exceeds their share")
+                               : absl::StrCat("writers use ", now.writing_bytes,
+                                              " bytes of memory for hulls being changed and points "
+                                              "in flight, which exceeds their share");
   return Overloaded(what, share(use), "memory-limit", kRetry);
 }
 

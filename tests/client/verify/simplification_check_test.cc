@@ -117,7 +117,7 @@ TEST(SimplificationCheck, ChecksTheRequestedLimits) {
   ExpectValid(Asked(kInside, 0, 1.5), cube, simple);
   // With both limits, the nearest that the server finds is accepted.
   ExpectValid(Asked(kInside, 4, 1.25), cube, simple);
-  ExpectInvalid(Asked(kInside, 4), cube, TetrahedronInCube(), "states no error");
+  ExpectInvalid(Asked(kInside, 4), cube, TetrahedronInCube(), "contains no error");
   ExpectInvalid(Asked(kInside, 4), cube, Claiming(NAN, TetrahedronInCube()), "is not a distance");
   ExpectInvalid(Asked(kInside, 4), cube, Claiming(-1, TetrahedronInCube()), "is not a distance");
 }

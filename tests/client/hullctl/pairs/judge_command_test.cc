@@ -62,13 +62,13 @@ TEST_F(Judge, WrongAnswersComeWorstFirstWithTheirProof) {
   ASSERT_EQ(lines.size(), 8u) << ran.out;
   EXPECT_THAT(lines[0], StartsWith("line 3\tcube\tcube\tfalse contact\toff by 1\tSEPARATED\t1 "));
   EXPECT_THAT(lines[1], StartsWith("line 5\tcube\tcube\tmiss\toff by 0.75\tOVERLAPPING\t-0.75"));
-  EXPECT_THAT(lines[2], HasSubstr("line 6\tcube\tcube\ttouching mistaken\toff by 0.5"));
+  EXPECT_THAT(lines[2], HasSubstr("line 6\tcube\tcube\ttouching\toff by 0.5"));
   EXPECT_THAT(lines[3], HasSubstr("line 2\tcube\tcube\tdistance\toff by 0.25\tSEPARATED\t2 "));
-  EXPECT_THAT(lines[4], HasSubstr("line 4\tcube\tcube\ttouching mistaken\toff by 0\tTOUCHING"));
+  EXPECT_THAT(lines[4], HasSubstr("line 4\tcube\tcube\ttouching\toff by 0\tTOUCHING"));
   for (size_t i = 0; i < 5; ++i) EXPECT_THAT(lines[i], EndsWith("\tvalid"));
   EXPECT_EQ(lines[5], "# 5 answers, 5 wrong, 0 failed");
   EXPECT_EQ(lines[6],
-            "# false contact 1, miss 1, touching mistaken 2, distance 1, depth 0, time 0");
+            "# false contact 1, miss 1, touching 2, distance 1, depth 0, time 0");
   EXPECT_THAT(lines[7], StartsWith("# largest error of a distance 0.25"));
 }
 
@@ -76,7 +76,7 @@ TEST_F(Judge, AProgramThatReportsOnlyCollisionsMayReportTouchingEitherWay) {
   const Ran ran = JudgeText(
       "a b b_x colliding\ncube cube 1 1\ncube cube 1 0\ncube cube 0.5 true\ncube cube 2 false\n");
   EXPECT_EQ(ran.code, 1);
-  EXPECT_THAT(ran.out, StartsWith("line 3\tcube\tcube\ttouching mistaken\t"));
+  EXPECT_THAT(ran.out, StartsWith("line 3\tcube\tcube\ttouching\t"));
   EXPECT_THAT(ran.out, HasSubstr("# 4 answers, 1 wrong"));
 }
 
@@ -132,7 +132,7 @@ TEST_F(Judge, FindsTheErrorsOfAFloatBoxTestWithAMargin) {
   EXPECT_EQ(ran.code, 1);
   EXPECT_THAT(ran.out, HasSubstr("# 300 answers, " + std::to_string(false_contacts) + " wrong"));
   EXPECT_THAT(ran.out, HasSubstr("# false contact " + std::to_string(false_contacts) +
-                                 ", miss 0, touching mistaken 0, distance 0, depth 0, time 0"));
+                                 ", miss 0, touching 0, distance 0, depth 0, time 0"));
   const std::string reported = ran.out.substr(ran.out.find("of a distance ") + 14);
   EXPECT_NEAR(std::stod(reported), largest, 1e-9);
 }
@@ -197,7 +197,7 @@ TEST_F(Judge, TimesOfContactAreJudgedAgainstTheProvenBracket) {
   for (size_t i = 0; i < 4; ++i) EXPECT_THAT(lines[i], EndsWith("\tvalid"));
   EXPECT_EQ(lines[4], "# 7 answers, 4 wrong, 0 failed");
   EXPECT_EQ(lines[5],
-            "# false contact 1, miss 1, touching mistaken 0, distance 0, depth 0, time 2");
+            "# false contact 1, miss 1, touching 0, distance 0, depth 0, time 2");
   EXPECT_THAT(lines[6], EndsWith(", of a time 0.25"));
   EXPECT_THAT(JudgeText(table, {"--max-time-error", "0.1"}).out, HasSubstr("3 wrong"));
   const std::string record = Lines(JudgeText(table, {"--output", "json"}).out)[0];
