@@ -371,17 +371,17 @@ absl::Status CheckTimes(v1::Relation relation, const v1::FirstContact& contact) 
       absl::StrCat("contact_time is ", time, ", not between separated_until, ", until, ", and 1"));
 }
 
-// Accepts a width of at most `most`, and adjacent doubles.
-absl::Status CheckWidth(const v1::FirstContact& contact, double most) {
+// Accepts a width of at most `max_width`, and adjacent doubles.
+absl::Status CheckWidth(const v1::FirstContact& contact, double max_width) {
   const double until = contact.separated_until();
   const double time = contact.contact_time();
   CommonExponent exponent;
-  exponent.Include(std::array{until, time, most});
+  exponent.Include(std::array{until, time, max_width});
   const bool is_narrow =
-      exponent.ToInteger(time) - exponent.ToInteger(until) <= exponent.ToInteger(most);
+      exponent.ToInteger(time) - exponent.ToInteger(until) <= exponent.ToInteger(max_width);
   if (is_narrow || time <= std::nextafter(until, 2)) return absl::OkStatus();
   return absl::OutOfRangeError(absl::StrCat("the first contact is proven to be between ", until,
-                                            " and ", time, ", which are more than ", most,
+                                            " and ", time, ", which are more than ", max_width,
                                             " apart"));
 }
 

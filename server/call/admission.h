@@ -55,8 +55,8 @@ class Admission {
 
     // Client and connection charged for the call in fair scheduling of the threads.
     ClientId client() const;
-    // True if the client had more than kFewCalls running calls when this one was admitted.
-    bool is_one_of_many() const { return is_one_of_many_; }
+    // True if the client had more than kBusyCalls running calls when this one was admitted.
+    bool is_client_busy() const { return is_client_busy_; }
 
    private:
     friend class Admission;
@@ -94,7 +94,7 @@ class Admission {
     CallKind kind_;
     Clients::value_type* client_ = nullptr;
     Share share_ = Share::kCalls;
-    bool is_one_of_many_ = false;
+    bool is_client_busy_ = false;
     // The caller's connection in the ConnectionTable; 0 if unknown.
     uint64_t connection_ = 0;
     // Set for calls with a token, and for downloads and batches while --max-request-time limits
@@ -113,7 +113,7 @@ class Admission {
 
   // Calls of a client with more running calls than this are not answered on arrival. They take
   // turns in the pools, by client and by connection.
-  static constexpr uint64_t kFewCalls = 16;
+  static constexpr uint64_t kBusyCalls = 16;
 
   const Limits& limits() const { return limits_; }
   const Guard* guard() const { return guard_; }

@@ -50,11 +50,11 @@ class Call {
     HULLD_CHECK(ticket_.has_value());
     return ticket_->client();
   }
-  // True if the client had many running calls when this one arrived (Admission::kFewCalls).
+  // True if the client had many running calls when this one arrived (Admission::kBusyCalls).
   // Requires that Begin succeeded.
-  bool is_one_of_many() const {
+  bool is_client_busy() const {
     HULLD_CHECK(ticket_.has_value());
-    return ticket_->is_one_of_many();
+    return ticket_->is_client_busy();
   }
   // Arrival time of the call or, in a stream that calls BeginMessage, of the message being
   // processed.

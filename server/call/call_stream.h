@@ -109,12 +109,12 @@ class RequestStream : public Stream {
   // to the constructor of Stream.
   template <typename... Args>
   explicit RequestStream(const Bytes& bytes, Args&&... args)
-      : Stream(std::forward<Args>(args)...), bytes_(TakenFrom(bytes)) {}
+      : Stream(std::forward<Args>(args)...), bytes_(StealBytes(bytes)) {}
 
   // Requires that the call was admitted.
   const Request& request() const { return request_; }
   // The request, for moving out a part of it. That part remains counted until the call ends.
-  Request& own_request() { return request_; }
+  Request& mutable_request() { return request_; }
 
  private:
   absl::Status Receive() final {
@@ -164,7 +164,7 @@ class ReadingStream : public Stream {
     if (this->call().is_revoked()) return false;
     HULLD_CHECK(!std::exchange(reading_, true) && !this->finished());
     if (share_.bytes() > kKeptBytes) request_ = Request();
-    share_.GiveBack();
+    share_.Release();
     this->StartRead(&bytes_);
     return true;
   }

@@ -27,7 +27,7 @@ absl::Status ParseRequest(Bytes& bytes, RequestMemory& memory, google::protobuf:
                           RequestMemory::Share& share);
 
 // Moves out the bytes of a request that gRPC passes as const but no longer needs.
-inline Bytes TakenFrom(const Bytes& bytes) {
+inline Bytes StealBytes(const Bytes& bytes) {
   Bytes taken;
   taken.Swap(const_cast<Bytes*>(&bytes));
   return taken;

@@ -19,9 +19,9 @@ class MessageLayout {
   static const MessageLayout& Of(const google::protobuf::Descriptor& type);
 
   // Returns an upper bound on the memory, in bytes, of a message after parsing. Stops counting
-  // above `most`. Includes unknown fields, which parsing keeps. Counts a malformed message up to
+  // above `limit`. Includes unknown fields, which parsing keeps. Counts a malformed message up to
   // the point where parsing fails. Cost: O(fields), a few ns each; packed numbers at memory speed.
-  uint64_t ParsedBytes(std::string_view message, uint64_t most) const;
+  uint64_t ParsedBytes(std::string_view message, uint64_t limit) const;
 
  private:
   // A number, a text, or a message; otherwise unknown.
@@ -39,10 +39,10 @@ class MessageLayout {
 
   explicit MessageLayout(const google::protobuf::Descriptor& type);
 
-  void Count(google::protobuf::io::CodedInputStream& input, uint64_t most, int depth,
+  void Count(google::protobuf::io::CodedInputStream& input, uint64_t limit, int depth,
              uint64_t& bytes) const;
   static bool CountDelimited(google::protobuf::io::CodedInputStream& input, const Field& field,
-                             uint64_t most, int depth, uint64_t& bytes);
+                             uint64_t limit, int depth, uint64_t& bytes);
 
   // Indexed by field number; gaps are unknown fields.
   std::vector<Field> fields_;

@@ -56,7 +56,7 @@ class QueuedStream : public CallStream<Reactor> {
   virtual bool IsWorking() const { return false; }
   // Returns true if the only queued reply must wait to be merged with later ones, which saves
   // writes. In that case, a Locked step must follow soon.
-  virtual bool KeepsWaiting() { return false; }
+  virtual bool ShouldDelayWrite() { return false; }
 
   // Queues a reply. bytes: its size, if the stream bounds its queue.
   void Queue(Reply reply, size_t bytes = 0) {
@@ -113,7 +113,7 @@ class QueuedStream : public CallStream<Reactor> {
     if (this->finished()) return;
     if (!end_.has_value()) StartWork();
     const bool is_alone = waiting_.size() == 1 && !end_.has_value();
-    if (!writing_ && !waiting_.empty() && !(is_alone && KeepsWaiting())) {
+    if (!writing_ && !waiting_.empty() && !(is_alone && ShouldDelayWrite())) {
       writing_ = true;
       bytes_ = SerializeReply(waiting_.front().reply);
       bytes_in_flight_ = waiting_.front().bytes;

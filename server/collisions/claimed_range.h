@@ -31,14 +31,15 @@ class ClaimedRange {
     unclaimed_.store(count, std::memory_order_release);
   }
 
-  // Claims the next block, of at most `most`; empty if everything is claimed. Requires most > 0.
-  Block Claim(uint32_t most) {
-    HULLD_CHECK(most > 0);
+  // Claims the next block, of at most `max_size`; empty if everything is claimed. Requires max_size >
+  // 0.
+  Block Claim(uint32_t max_size) {
+    HULLD_CHECK(max_size > 0);
     uint32_t end = unclaimed_.load(std::memory_order_acquire);
     // Earlier reads do not matter: if a new range has begun since, the exchange makes it visible,
     // and the block belongs to it.
     while (end > 0) {
-      const uint32_t begin = end - std::min(end, most);
+      const uint32_t begin = end - std::min(end, max_size);
       if (unclaimed_.compare_exchange_weak(end, begin, std::memory_order_acq_rel,
                                            std::memory_order_acquire)) {
         return {begin, end};
@@ -49,7 +50,7 @@ class ClaimedRange {
 
   // Accepts a claimed block after its work is done. Returns true for exactly one caller, the last,
   // which sees the writes of all threads.
-  bool GiveBack(const Block& block) {
+  bool Complete(const Block& block) {
     const uint32_t done = block.end - block.begin;
     return left_.fetch_sub(done, std::memory_order_acq_rel) == done;
   }

@@ -158,7 +158,7 @@ class CollisionStream
                                             parts_.registry.limits(), call().lifetime()));
     HULLD_ASSIGN_OR_RETURN(
         freshness_, DecodeFreshness(open.freshness(), parts_.store, call().message_arrival()));
-    HULLD_RETURN_IF_ERROR(RefuseMotions(open.placements(), open.packed_placements(), "a stream"));
+    HULLD_RETURN_IF_ERROR(CheckNoMotions(open.placements(), open.packed_placements(), "a stream"));
     HULLD_ASSIGN_OR_RETURN(
         table_,
         PlacementTable::Make(open.placements(), *open.mutable_packed_placements(), call().caller(),
@@ -280,7 +280,7 @@ class CollisionStream
       if (!call().ShouldStop()) {
         for (uint32_t i = block.begin; i < block.end; ++i) Decide(i);
       }
-      if (unclaimed_.GiveBack(block)) return AnswerSlice();
+      if (unclaimed_.Complete(block)) return AnswerSlice();
       if (std::chrono::steady_clock::now() >= end) return RunOn(lane_, [this] { DecideBlocks(); });
     }
   }

@@ -81,9 +81,9 @@ class Registry {
   // Sets the maximum number of unused hull records, and of small body records, kept in memory if
   // the store finds records. Replaces the default derived from --memory-limit. Call before Load;
   // for tests.
-  void KeepRecords(size_t most) {
-    state_.hulls.KeepAtMost(most);
-    state_.bodies.KeepAtMost(most * 2 * BodyTable::kBytesOfEntry);
+  void SetRecordCapacity(size_t capacity) {
+    state_.hulls.SetCapacity(capacity);
+    state_.bodies.SetCapacity(capacity * 2 * BodyTable::kBytesOfEntry);
   }
 
   const Store& store() const { return state_.store; }

@@ -70,7 +70,7 @@ void EndListed(Registry& registry, TaskPool& pool, UnaryCall* call, Rpc rpc, Rec
         EncodePageToken(rpc, prefix, page->entries.back().record.hull_id));
     return absl::OkStatus();
   };
-  EndFresh(registry, pool, call, answer, !registry.store().finds_records());
+  EndFresh(registry, pool, call, answer, !registry.store().supports_lookup());
 }
 
 // Ends a unary call that deletes a hull or a body after the deletion is committed. kind: "hull" or

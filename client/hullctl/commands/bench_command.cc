@@ -80,11 +80,11 @@ std::string CodeName(absl::StatusCode code) { return absl::StatusCodeToString(co
 void PrintHistogram(const LatencyHistogram& latencies, std::ostream& out) {
   constexpr size_t kWidth = 50;
   const std::vector<LatencyHistogram::Row> rows = latencies.Rows();
-  uint64_t most = 1;
-  for (const LatencyHistogram::Row& row : rows) most = std::max(most, row.count);
+  uint64_t max_count = 1;
+  for (const LatencyHistogram::Row& row : rows) max_count = std::max(max_count, row.count);
   for (const LatencyHistogram::Row& row : rows) {
     // A bar has at least one character.
-    const size_t length = (row.count * kWidth + most - 1) / most;
+    const size_t length = (row.count * kWidth + max_count - 1) / max_count;
     out << absl::StrFormat("  %7s - %-7s %10u  %s\n", TimeText(row.from), TimeText(row.to),
                            row.count, std::string(length, '#'));
   }

@@ -75,11 +75,11 @@ absl::Status ReadDistance(std::string_view cell, std::optional<double>* distance
   return read.status();
 }
 
-// Reads a number from 0 to `most`, called `what`.
-absl::Status ReadUpTo(double most, const char* what, std::string_view cell,
+// Reads a number from 0 to `max`, called `what`.
+absl::Status ReadUpTo(double max, const char* what, std::string_view cell,
                       std::optional<double>* value) {
   HULLD_ASSIGN_OR_RETURN(const auto read, NumberOf(cell));
-  if (read < 0 || read > most) {
+  if (read < 0 || read > max) {
     return absl::InvalidArgumentError(
         absl::StrCat(std::string(cell), " is not a ", what, "; leave the cell empty"));
   }

@@ -183,7 +183,7 @@ class Client(ClientBase):
         if not is_iterator(points):
             points = as_points(cast(PointsLike, points))
         opening = requests.open_replacement(hull_id, create, if_revision)
-        bytes_of_chunk = arguments.count(chunk_bytes, "chunk_bytes", least=1)
+        bytes_of_chunk = arguments.count(chunk_bytes, "chunk_bytes", minimum=1)
         seconds = arguments.seconds(timeout)
         failure: list[Exception] = []
 

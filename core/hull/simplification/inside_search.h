@@ -25,7 +25,7 @@ namespace hulld {
 // nearly equilateral ones, as far as curvature permits, which have the least error for their area.
 // Source: Chen and Xu 2004, Optimal Delaunay Triangulations, for the position of maximum volume;
 // Lloyd 1982, Least Squares Quantization in PCM, for moving all at once.
-VertexChoice ChooseInside(const Hull& hull, double max_error, size_t most, StopPoll& poll);
+VertexChoice ChooseInside(const Hull& hull, double max_error, size_t max_vertices, StopPoll& poll);
 
 }  // namespace hulld
 

@@ -278,13 +278,13 @@ class Surface {
   Location SeenNear(TriangleId id, const Vector& point, double size) const {
     const SurfaceTriangle& t = triangles_[id];
     TriangleId best = id;
-    double most = HeightAbove(t, point, size);
+    double largest = HeightAbove(t, point, size);
     for (const TriangleId next : t.neighbors) {
       const double height = HeightAbove(triangles_[next], point, size);
-      best = height > most ? next : best;
-      most = std::max(most, height);
+      best = height > largest ? next : best;
+      largest = std::max(largest, height);
     }
-    return {most > 0 ? Side::kOutside : Side::kUnknown, best};
+    return {largest > 0 ? Side::kOutside : Side::kUnknown, best};
   }
   // Returns the point's height above the triangle's plane, times the length of its normal, if that
   // is certainly above zero; otherwise zero.

@@ -107,7 +107,7 @@ class BodyTable {
 
   // Makes this a cache of at most `bytes`, exceeded only by entries in use. Requires an empty
   // table.
-  void KeepAtMost(uint64_t bytes) { most_ = bytes; }
+  void SetCapacity(uint64_t bytes) { capacity_ = bytes; }
 
   size_t size() const { return entries_.size(); }
   bool contains(const std::string& id) const { return entries_.contains(id); }
@@ -135,7 +135,7 @@ class BodyTable {
   std::list<const std::string*> used_;
   uint64_t bytes_ = 0;
   // Limit in bytes; set if this is a cache.
-  std::optional<uint64_t> most_;
+  std::optional<uint64_t> capacity_;
 };
 
 // A body as seen by one call. References the hulls of its pieces. Charged to --memory-limit.

@@ -68,7 +68,7 @@ class HullTable {
 
   // Makes this a cache of at most `records`, exceeded only by hulls in use. Requires an empty
   // table.
-  void KeepAtMost(size_t records) { most_ = records; }
+  void SetCapacity(size_t records) { capacity_ = records; }
 
  private:
   // State of a hull at rest, except its ID.
@@ -182,7 +182,7 @@ class HullTable {
     }
   };
 
-  bool is_cache() const { return most_.has_value(); }
+  bool is_cache() const { return capacity_.has_value(); }
   std::pair<Place, bool> AddEntry(const std::string& id);
   void EraseEntry(Place place);
   Entry& Add(const std::string& id);
@@ -197,7 +197,7 @@ class HullTable {
   // All entries, for lookups. A search of the ordered map takes about 2 us with a million entries.
   absl::flat_hash_set<Place, HashOfId, EqualIds> index_;
   // Limit in records; set if this is a cache.
-  std::optional<size_t> most_;
+  std::optional<size_t> capacity_;
   // ID of the last hull that RestSome visited, and of the last one that DropCompact visited.
   std::string hand_;
   std::string compact_hand_;

@@ -195,7 +195,7 @@ class RegisteredHull {
   // Returns a chunk to the queue, before all later chunks.
   void Requeue(PendingChunk chunk);
   // True if an earlier chunk than this one is queued. Requires: this one is not queued.
-  bool IsQueuedBefore(const PendingChunk& chunk) const {
+  bool HasEarlierChunk(const PendingChunk& chunk) const {
     return !chunks.empty() && chunks.front().place < chunk.place;
   }
 
@@ -298,7 +298,7 @@ const std::shared_ptr<const ServedHull>& EmptyServedHull();
 // Calls `done` after the mutex is released.
 template <typename T>
 void Answer(Locked& locked, const Reply<T>& done, std::type_identity_t<absl::StatusOr<T>> result) {
-  locked.Afterwards([done, result = std::move(result)] { done(result); });
+  locked.Defer([done, result = std::move(result)] { done(result); });
 }
 
 std::string QuotedHull(const std::string& id);

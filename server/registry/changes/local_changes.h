@@ -78,7 +78,7 @@ class LocalChanges {
   void PutBody(StoredBody stored, std::optional<uint64_t> if_revision,
                const Reply<PutBodyResult>& done);
   // Replaces a hull atomically for all readers. The result is a new incarnation: sessions of the
-  // former one end. Replies as above. Requires a builder. Copies the vertices, so it must not run
+  // previous one end. Replies as above. Requires a builder. Copies the vertices, so it must not run
   // on a gRPC thread. NOT_FOUND, unless create_if_absent; ABORTED: if_revision does not match;
   // RESOURCE_EXHAUSTED: --max-hulls, or the disk is full; UNAVAILABLE: as above.
   void Replace(Replacement replacement, const Reply<PutHullResult>& done);
@@ -119,8 +119,9 @@ class LocalChanges {
   absl::Status CheckPutBody(Locked& locked, const std::string& id,
                             std::optional<uint64_t> if_revision);
   void SubmitBody(Locked& locked, Change change, Committer::Completion finish);
-  absl::Status CheckReplacement(const RegisteredHull* former, const Replacement& replacement) const;
-  void CommitReplacement(Locked& locked, const HullPointer& former,
+  absl::Status CheckReplacement(const RegisteredHull* previous,
+                                const Replacement& replacement) const;
+  void CommitReplacement(Locked& locked, const HullPointer& previous,
                          const std::shared_ptr<Replacement>& replacement,
                          const Reply<PutHullResult>& done, const LockedTask& again);
 

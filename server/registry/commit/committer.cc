@@ -62,7 +62,7 @@ void Committer::StartBarrier(Locked& locked, Barrier barrier) {
     if (may_start) is_starting_ = true;
   }
   if (may_start) {
-    locked.Afterwards([this] { StartFetch(); });
+    locked.Defer([this] { StartFetch(); });
   } else {
     ready_.notify_one();
   }
@@ -232,7 +232,7 @@ void Committer::ApplyPeerChanges(Locked& locked, const PeerChanges& changes,
   }
   peers_->Apply(locked, changes);
   // Destroys large changes without a lock.
-  locked.Afterwards([ended = std::make_shared<std::vector<Pending>>(std::move(superseded))] {});
+  locked.Defer([ended = std::make_shared<std::vector<Pending>>(std::move(superseded))] {});
 }
 
 }  // namespace hulld::server

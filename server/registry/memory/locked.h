@@ -121,7 +121,7 @@ class Locked {
   // Releases the mutex and runs the deferred tasks in order.
   void Unlock() {
     HULLD_CHECK(is_held_);
-    const std::vector<std::function<void()>> due = std::exchange(afterwards_, {});
+    const std::vector<std::function<void()>> due = std::exchange(deferred_, {});
     is_held_ = false;
     mutex_.unlock();
     for (const std::function<void()>& task : due) task();
@@ -186,10 +186,10 @@ class Locked {
     NoteLookup();
   }
 
-  void Afterwards(std::function<void()> task) { afterwards_.push_back(std::move(task)); }
+  void Defer(std::function<void()> task) { deferred_.push_back(std::move(task)); }
   // Defers a task that acquires the mutex again.
-  void AfterwardsLocked(std::function<void(Locked&)> task) {
-    Afterwards([&mutex = mutex_, task = std::move(task)] {
+  void DeferLocked(std::function<void(Locked&)> task) {
+    Defer([&mutex = mutex_, task = std::move(task)] {
       Locked again(mutex);
       task(again);
     });
@@ -200,13 +200,13 @@ class Locked {
   }
   template <typename T>
   void Discard(std::shared_ptr<T> object) {
-    if (object != nullptr) afterwards_.push_back([kept = std::move(object)] {});
+    if (object != nullptr) deferred_.push_back([kept = std::move(object)] {});
   }
 
  private:
   FairMutex& mutex_;
   bool is_held_ = false;
-  std::vector<std::function<void()>> afterwards_;
+  std::vector<std::function<void()>> deferred_;
 };
 
 // A task that runs with the mutex held.

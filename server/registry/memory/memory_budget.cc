@@ -121,9 +121,9 @@ void MemoryCharge::Set(uint64_t bytes) {
 
 void MemoryBudget::Evict(Locked& owners) {
   HULLD_CHECK(owners.Holds(owners_));
-  const size_t most = std::min(kMaxVisited, used_.size());
-  for (size_t visited = 0; visited < most && !used_.empty() && Statistics().bytes > limit_bytes_;
-       ++visited) {
+  const size_t max_visited = std::min(kMaxVisited, used_.size());
+  for (size_t visited = 0;
+       visited < max_visited && !used_.empty() && Statistics().bytes > limit_bytes_; ++visited) {
     Account& account = *used_.back();
     used_.splice(used_.begin(), used_, account.place_);
     const uint64_t before = Statistics().bytes;

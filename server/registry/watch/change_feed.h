@@ -244,13 +244,13 @@ class ChangeFeed {
   uint64_t revision() const { return revision_; }
 
   // Note a committed change at the revision of its record, or at `revision`. body: null for a
-  // change of a hull. former: the incarnation that had the ID before, possibly the same one;
+  // change of a hull. previous: the incarnation that had the ID before, possibly the same one;
   // nullopt: none. It is of the other kind if peer servers turned a hull into a body, or a body
   // into a hull, by several changes. Cost: O(log n) per group that includes the ID, and one hash
   // per length of a watched prefix.
-  void NotePresent(Locked& locked, const std::optional<Incarnation>& former,
+  void NotePresent(Locked& locked, const std::optional<Incarnation>& previous,
                    const HullPointer& hull, const std::shared_ptr<const Body>& body);
-  void NoteDeleted(Locked& locked, const std::string& id, const Incarnation& former,
+  void NoteDeleted(Locked& locked, const std::string& id, const Incarnation& previous,
                    uint64_t revision);
   // Notes a revision whose change cannot be described; only the revision is reported.
   void NoteOther(const Locked& locked, uint64_t revision);
@@ -290,7 +290,7 @@ class ChangeFeed {
     HullPointer hull = nullptr;
     std::shared_ptr<const Body> body = nullptr;
     // If the change replaced a hull with a body or a body with a hull: create_revision of the
-    // former. Otherwise 0.
+    // previous. Otherwise 0.
     uint64_t other_kind_began = 0;
   };
   friend struct WatchGroup;

@@ -72,7 +72,7 @@ class TestQueue : public QueuedStream<WriteReactor, Batch> {
   void Open() override { script_(std::static_pointer_cast<TestQueue>(shared_from_this())); }
   void StartWork() override {}
   bool IsWorking() const override { return working_; }
-  bool KeepsWaiting() override { return keeps_waiting_; }
+  bool ShouldDelayWrite() override { return keeps_waiting_; }
 
   const Script script_;
   const std::shared_ptr<Signal> gone_;

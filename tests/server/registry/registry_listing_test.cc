@@ -18,7 +18,7 @@ namespace registry_listing_test {
 class ListedStore : public MemoryStore {
  public:
   bool keeps_hulls() const override { return true; }
-  bool finds_records() const override { return true; }
+  bool supports_lookup() const override { return true; }
   absl::Status Commit(std::span<Change* const> changes) override {
     std::unique_lock lock(mutex_);
     const absl::Status committed = MemoryStore::Commit(changes);

@@ -67,7 +67,7 @@ struct Plan {
   // If true, the memory limit is reached under pressure only.
   bool has_memory = false;
   // True if the store finds records; and the number of records that a server keeps.
-  bool finds_records = false;
+  bool supports_lookup = false;
   size_t records = 0;
   // Servers over one database, and the clients of each.
   size_t servers = 1;

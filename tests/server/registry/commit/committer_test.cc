@@ -159,7 +159,7 @@ class CommitterTest : public ::testing::Test {
         [this, revision, ended](Locked& later, const absl::Status& status, const Change&) {
           EXPECT_TRUE(later.Holds(order_));
           outcomes_.emplace_back(revision, status.code());
-          later.Afterwards([ended] { ended->set_value(); });
+          later.Defer([ended] { ended->set_value(); });
         });
     return ended->get_future();
   }

@@ -135,7 +135,7 @@ TEST_P(PostgresDisk, AFullTablespaceIsReportedAndTheChangeRolledBack) {
 
 // PostgreSQL ends all its processes and recovers. If recovery needs space as well, it shuts down.
 TEST_P(PostgresDisk, AFullLogDiskLosesNothing) {
-  options_.patience = std::chrono::milliseconds(500);
+  options_.retry_timeout = std::chrono::milliseconds(500);
   Start("pg_default");
   ASSERT_TRUE(PutNext().ok());
   machine_->log.Fill();

@@ -63,7 +63,7 @@ TEST_F(PostgresFault, ALateTransactionChangesNothing) {
 
 // While the outcome cannot be determined, the error says so and further changes are refused.
 TEST_F(PostgresFault, AnUnknownOutcomeIsReported) {
-  options_.patience = std::chrono::milliseconds(0);
+  options_.retry_timeout = std::chrono::milliseconds(0);
   for (const Cut cut : {Cut::kBeforeCommit, Cut::kAfterCommit}) {
     const std::string id = cut == Cut::kAfterCommit ? "after" : "before";
     Start();
@@ -114,7 +114,7 @@ TEST_F(PostgresFault, WritersDoNotNoticeARestartOfTheDatabase) {
 }
 
 TEST_F(PostgresFault, AnUnreachableDatabaseRefusesOnlyChanges) {
-  options_.patience = std::chrono::milliseconds(50);
+  options_.retry_timeout = std::chrono::milliseconds(50);
   Start();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
   const HullView before = *hulls_->View("h");
@@ -141,8 +141,8 @@ TEST_F(PostgresFault, AnUnreachableDatabaseRefusesOnlyChanges) {
 
 // The database neither answers nor closes its connections.
 TEST_F(PostgresFault, AHungDatabaseBlocksNoThreadForever) {
-  options_.answer_time = std::chrono::milliseconds(200);
-  options_.patience = std::chrono::milliseconds(100);
+  options_.answer_timeout = std::chrono::milliseconds(200);
+  options_.retry_timeout = std::chrono::milliseconds(100);
   options_.conninfo += " connect_timeout=2";
   Start();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());

@@ -342,7 +342,7 @@ TEST_F(PostgresRecords, AWatchReportsExistingAndDeletedRecords) {
   FillSome();
   ASSERT_TRUE(hulls_->Create("d").ok());
   Registry& registry = hulls_->registry();
-  registry.KeepRecords(0);
+  registry.SetRecordCapacity(0);
   const uint64_t before = registry.Sizes().store_revision;
   ASSERT_TRUE(hulls_->Delete("a").ok());
   ASSERT_TRUE(hulls_->Delete("c").ok());

@@ -411,7 +411,7 @@ TEST_F(PostgresShared, ACommitWithALostAnswerIsFoundAndNotRepeated) {
 
 // The change is refused with an unknown outcome, and later applied as if a peer server had made it.
 TEST_F(PostgresShared, AnUnknownOutcomeIsResolvedLater) {
-  options_.patience = std::chrono::milliseconds(0);
+  options_.retry_timeout = std::chrono::milliseconds(0);
   for (const Cut cut : {Cut::kBeforeCommit, Cut::kAfterCommit}) {
     const std::string id = cut == Cut::kAfterCommit ? "after" : "before";
     Start();
@@ -579,7 +579,7 @@ TEST_F(PostgresShared, AServerWaitsIfTheDatabaseHasNoFreeSessions) {
     Ask(absl::StrCat("ALTER DATABASE ", database, " OWNER TO ", role));
     options_.conninfo = absl::StrCat("host=", cluster().socket_directory(), " dbname=", database,
                                      " user=", role, " password=narrow");
-    options_.patience = std::chrono::milliseconds(0);
+    options_.retry_timeout = std::chrono::milliseconds(0);
     const absl::Status refused = Open().status();
     EXPECT_TRUE(absl::IsUnavailable(refused)) << refused;
     EXPECT_THAT(std::string(refused.message()), HasSubstr("too many connections"));
@@ -590,7 +590,7 @@ TEST_F(PostgresShared, AServerWaitsIfTheDatabaseHasNoFreeSessions) {
       has_waited = true;
       return false;
     };
-    options_.patience = std::chrono::seconds(10);
+    options_.retry_timeout = std::chrono::seconds(10);
     const auto opened = Open();
     EXPECT_TRUE(opened.ok()) << opened.status();
     EXPECT_TRUE(has_waited);
@@ -655,7 +655,7 @@ TEST_F(PostgresShared, ARestoredDatabaseIsADifferentStoreForAllServers) {
 
 // Half of a batch has arrived, and nothing follows.
 TEST_F(PostgresShared, AServerStalledWithinABatchBlocksPeersOnlyBriefly) {
-  options_.longest_send = std::chrono::milliseconds(100);
+  options_.send_timeout = std::chrono::milliseconds(100);
   options_.heartbeat = std::chrono::milliseconds(50);
   Start();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
