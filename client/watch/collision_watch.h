@@ -23,8 +23,8 @@ namespace hulld {
 // by one thread, not necessarily the same one, and Cancel by any thread.
 class CollisionWatch {
  public:
-  // Next connects. reconnect_timeout: the time to reconnect to a lost server. The first call and
-  // refused calls are retried as `retry` specifies.
+  // Next connects. reconnect_timeout: limits the attempts to reconnect to a lost server. The first
+  // call and refused calls are retried as `retry` specifies.
   CollisionWatch(std::shared_ptr<v1::CollisionService::Stub> stub, v1::CollisionWatchOpen open,
                  RetryPolicy retry, std::chrono::milliseconds reconnect_timeout);
   // Cancels the watch.

@@ -24,13 +24,13 @@ class MessageLayout {
   uint64_t ParsedBytes(std::string_view message, uint64_t limit) const;
 
  private:
-  // A number, a text, or a message; otherwise unknown.
+  // A number, a string, or a message. Any other field counts as unknown.
   struct Field {
     bool is_number() const { return element_bytes > 0; }
 
     bool is_repeated = false;
     bool is_text = false;
-    // As the contract declares it; lists of numbers are packed or not.
+    // Wire type of a single value. Lists of numbers may be packed or not.
     uint8_t wire_type = 0;
     // Bytes of a number in memory.
     uint32_t element_bytes = 0;

@@ -177,8 +177,8 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     piece.replies.clear();
     piece.bytes = 0;
   }
-  // Called after all pieces are delivered. Returns the number of further units, which exist only
-  // from then on; 0 if there are none.
+  // Called after all pieces are delivered. Returns the number of additional units that become known
+  // only then, or 0.
   virtual uint64_t CountFollowingUnits() { return 0; }
   // Called when no units are left, to queue a final message; the end is set afterwards.
   virtual void OnAllDelivered() {}

@@ -101,8 +101,8 @@ ReadPlan PlanOf(const PlacedLookup& lookup) {
 }
 
 // Returns the bodies among the IDs; empty if there are none. Omits IDs that cannot be read now: the
-// subsequent hull lookup reports their errors. Otherwise as RecordReader::FindBodies. WouldWait
-// also if there are bodies, whose boxes must be built.
+// subsequent hull lookup reports their errors. Other errors: see RecordReader::FindBodies.
+// WouldWait also if there are bodies, whose boxes must be built.
 absl::StatusOr<Bodies> BodiesAmong(Registry& registry, std::span<const std::string> ids,
                                    const std::function<bool()>& should_stop, bool may_wait) {
   if (!registry.has_bodies()) return Bodies();

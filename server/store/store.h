@@ -66,7 +66,7 @@ struct Change {
   std::vector<Vector> vertices;
   // The writer, if the change is a chunk.
   std::optional<WriterSequence> writer;
-  // The incarnation that this one replaces, if any.
+  // The hull that this incarnation replaces, if any.
   std::optional<StoredHull> replaced;
   // The body after the change, or the deleted body. If set, the fields about a hull are unused.
   std::shared_ptr<StoredBody> body;
@@ -168,7 +168,7 @@ struct RecordKinds {
   bool bodies = false;
 };
 
-// Failed operations so far, each counted once, by the refused system call.
+// Failed operations so far, each counted once, by the system call that failed.
 struct StoreFailures {
   // Writes, and reopening the store after an error.
   uint64_t write = 0;
@@ -224,9 +224,9 @@ class Store {
   virtual absl::StatusOr<uint64_t> LoadSequence(const HullRecord& hull,
                                                 const std::string& writer_id) = 0;
 
-  // True if single records can be looked up at low cost, so that a start need not read them all.
-  // Results of the following two include everything committed before the call, by any server.
-  // UNAVAILABLE: the store cannot be read.
+  // True if the store can look up single records at low cost, so that they need not all be read at
+  // startup. The results of the next two functions include everything committed before the call, by
+  // any server. UNAVAILABLE: the store cannot be read.
   virtual bool supports_lookup() const { return false; }
   // Returns the hulls and bodies with these IDs.
   virtual absl::StatusOr<FoundRecords> FindRecords(std::span<const std::string> /*ids*/) {

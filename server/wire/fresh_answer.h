@@ -44,8 +44,7 @@ void EndFresh(Registry& registry, TaskPool& pool, UnaryCall* call, Answer answer
   });
 }
 
-// Ends a unary call that lists records of these kinds, as EndFresh. add: adds an entry to the
-// reply.
+// Like EndFresh, for a call that lists records of these kinds. add: adds an entry to the reply.
 template <typename UnaryCall, typename AddEntry>
 void EndListed(Registry& registry, TaskPool& pool, UnaryCall* call, Rpc rpc, RecordKinds kinds,
                AddEntry add) {

@@ -21,7 +21,7 @@ class HullFollower {
  public:
   // `synced`: the initial state is complete.
   using Receiver = std::function<void(const v1::HullEvent& event, bool synced)>;
-  // Receives the reason why hulls are currently not followed. Recovery is not reported.
+  // Receives the reason that hulls cannot be followed at the moment. Recovery is not reported.
   using Complaint = std::function<void(const std::string& message)>;
 
   HullFollower(const Client& client, v1::WatchHullsRequest request, Receiver receive,
@@ -29,7 +29,7 @@ class HullFollower {
   // Cancels and waits for the thread, which may be inside the receiver.
   ~HullFollower();
 
-  // Makes the thread end soon; does not wait.
+  // Asks the thread to end; does not wait for it.
   void Cancel();
   // Returns true if the thread has ended, so that the destructor does not wait.
   bool finished() const { return finished_; }

@@ -170,7 +170,7 @@ class Surface {
   // than the surface has triangles.
   bool MeasureBefore(const VertexTable& vertices, size_t points, double fineness,
                      double walks_per_point, StopPoll& poll, TriangleCones* cones);
-  // False if the map rejected too few of the points looked up since the last measurement.
+  // Returns false if the map rejected too few of the points looked up since the last measurement.
   bool IsMapWorthwhile() const { return 8 * rejected_ >= asked_; }
   // Records the number of points looked up in the map and rejected by it, as a measure of its
   // value.

@@ -291,13 +291,14 @@ absl::StatusOr<BodyAnswer> BodySearch::TakeLeast() const {
   absl::StatusOr<Answer> answer = CheckCollision(a.placed(), b.placed(), OfDecidingPair(*options_));
   if (!answer.ok()) return answer.status();
   BodyAnswer result = {{decided_, {}}, *std::move(answer)};
-  // Signs of separations are exact, so the least separation has the sign of the strongest relation.
+  // Signs of separations are exact, so the smallest separation has the sign of the strongest
+  // relation.
   HULLD_CHECK(result.answer.relation == relation_);
   result.answer.rung = rung_;
   if (options_->clearance) result.answer.within_clearance = within_clearance_;
   if (!result.answer.separation || relation_ == Relation::kTouching) return result;
   Separation& separation = *result.answer.separation;
-  // Another pair with smaller bounds may have the least separation.
+  // Another pair with smaller bounds may have the smallest separation.
   const double bound = std::max(separation.value - min_low_, min_high_ - separation.value);
   if (bound > separation.bound) separation.bound = std::nextafter(bound, kInfinity);
   return result;

@@ -194,8 +194,8 @@ class SceneCandidates {
   size_t next_ = 0;
 };
 
-// Maximum number of answers that FindCollisions buffers. A choice: three to four MiB with
-// certificates, and enough for many threads.
+// Maximum number of answers that FindCollisions buffers: three to four MiB with certificates, and
+// enough for many threads. Not tuned.
 inline constexpr size_t kMaxEmittedAnswers = 4096;
 
 // Finds all colliding pairs of placements. A tree of bounding boxes yields the pairs with

@@ -300,7 +300,7 @@ void RegisteredHull::NoteUse() {
               is_for_writing);
 }
 
-// A part at a repeated address reuses free memory: the previous part had no holder.
+// If an address repeats, its memory was freed and reused, so the earlier part had no holder.
 void RegisteredHull::CountParts() {
   MemoryParts parts;
   served_.shared_bytes = 0;

@@ -162,7 +162,7 @@ absl::StatusOr<uint64_t> LocalChanges::CommittedSequence(Locked& locked, Registe
   hull.EndReadingSequence();
   if (absl::IsAborted(sequence.status())) {
     HULLD_RETURN_IF_ERROR(peers_.AwaitPeers(locked, {}));
-    // Every caller checks for this.
+    // Every caller checks whether the hull is gone.
     if (hull.state.gone()) return 0;
     if (hull.supersessions() == supersessions && hull.committed().record == record) {
       return StoreDisagrees(record);
@@ -252,7 +252,7 @@ void LocalChanges::ApplyChunk(Locked& locked, const HullPointer& hull, PendingCh
   absl::StatusOr<BuiltChunk> built = Build(locked, *hull, pending);
   if (Committer::IsSuperseded(built.status())) {
     if (!Stopped(pending.should_stop)) {
-      // It will be rebuilt.
+      // The chunk will be built again.
       hull->Requeue(std::move(pending));
       return;
     }

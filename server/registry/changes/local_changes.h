@@ -30,12 +30,12 @@ struct PendingChunk;
 // writers' chunks (hull_appender.cc).
 //
 // Creation, deletion, and replacement depend on the state of an ID: they load that state, wait
-// until no change of the ID is in flight, and then decide within one hold of the mutex. Chunks
-// overlap. The thread that owns the hull's builder (HullState) builds a chunk without the mutex and
-// appends the new vertices to the LiveHull; the resulting change is submitted, and the next chunk
-// of the hull may be built on it immediately. If the batch fails, all later chunks fail too, and
-// the hull returns to its last committed state (Revert). If a peer server committed first, a change
-// is retried on the new state, and a chunk returns to its place in the queue.
+// until no change of the ID is in flight, and then decide in one critical section. Chunks overlap.
+// The thread that owns the hull's builder (HullState) builds a chunk without the mutex and appends
+// the new vertices to the LiveHull; the resulting change is submitted, and the next chunk of the
+// hull may be built on it immediately. If the batch fails, all later chunks fail too, and the hull
+// returns to its last committed state (Revert). If a peer server committed first, a change is
+// retried on the new state, and a chunk returns to its place in the queue.
 //
 // Invariants:
 //   - Advance follows each transition of a hull's HullState, so no runnable task keeps waiting. It

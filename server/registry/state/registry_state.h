@@ -30,10 +30,10 @@ namespace hulld::server {
 // committed change and notes it in the feed, which keeps the revision. Never blocks.
 //
 // Invariants:
-// - Revisions are applied in increasing order, and each change atomically, within one hold of the
-//   mutex.
-// - No ID is in both tables. If the store finds records, the tables are caches: an ID in neither is
-//   unknown (IsKnown). The known absence of both a hull and a body is an entry of the hull table.
+// - Revisions are applied in increasing order, and each change atomically, in one critical section.
+// - No ID is in both tables. If the store supports record lookup, the tables are caches: an ID in
+//   neither is unknown (IsKnown). The known absence of both a hull and a body is an entry of the
+//   hull table.
 // - The tables contain the last committed version of each known entry, of revision() or earlier.
 //   They also contain entries being created: a hull in kCreating, a body without a committed
 //   version.

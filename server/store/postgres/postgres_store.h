@@ -24,12 +24,13 @@
 
 namespace hulld::server {
 
-// Pauses between attempts to reach the database: doubled from the first up to the longest.
+// Pauses between attempts to reach the database. The pause doubles from the first value to the
+// longest.
 inline constexpr std::chrono::milliseconds kFirstRetryPause{10};
 inline constexpr std::chrono::milliseconds kLongestRetryPause{500};
 
 struct PostgresOptions {
-  // Names the file of the connection string, for errors.
+  // The setting that names the file with the connection string, for error messages.
   static constexpr char kSetting[] = "--postgres-conninfo-file";
 
   // A connection string of libpq.
@@ -49,7 +50,7 @@ struct PostgresOptions {
   std::chrono::milliseconds lock_timeout{15'000};
   // Maximum silence of the database while an answer is due. Longer than lock_timeout.
   std::chrono::milliseconds answer_timeout{30'000};
-  // Time for a commit that lost its session to determine its outcome or to retry; also the time for
+  // Time limit for a commit that lost its session to determine its outcome or to retry, and for
   // Open to open the sessions after the first.
   std::chrono::milliseconds retry_timeout{10'000};
   // Interval at which this server checks that it is still active. The database considers the server
@@ -141,8 +142,8 @@ class PostgresStore : public Store, public PeerFeed {
   // The epoch of this server, which only grows.
   uint64_t epoch() const { return epoch_.load(); }
 
-  // For a migration: the session of commits, and the statement of a transaction that commits
-  // nothing else than `added`, the change of the totals, and this revision.
+  // For a migration: the session that commits, and the statement that fences a transaction, sets
+  // the store's revision, and adds `added` to its totals.
   Session& writer() { return *writer_; }
   Statement Fence(uint64_t revision, const StoreTotals& added) const {
     return Fence({batch_, revision, added});
@@ -255,7 +256,7 @@ class PostgresStore : public Store, public PeerFeed {
   PeerChanges peer_changes_;
   // Shared: a started query for Fetch to finish; null: it must send one.
   std::unique_ptr<Session> fetching_;
-  // The database has lost batches.
+  // True if the database has lost batches.
   bool has_lost_batches_ = false;
   // Not OK: the outcome of batch_ + 1 is unknown.
   absl::Status unknown_;

@@ -1,4 +1,4 @@
-// Lists over a store that finds records: every later read agrees with a list.
+// Lists over a store that supports record lookup: every later read agrees with a list.
 #include <absl/status/status.h>
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
-// Requests of a registry to a store that finds records: none at the start, and one per record while
-// it is cached.
+// Requests of a registry to a store that supports record lookup: none at the start, and one per
+// record while it is cached.
 #include <absl/strings/str_cat.h>
 #include <gtest/gtest.h>
 
