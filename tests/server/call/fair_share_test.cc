@@ -171,7 +171,7 @@ TEST_F(FairShare, CallsWithoutATokenKeepNoConnectionFromEviction) {
   EXPECT_EQ(connections_.Evict(), 1);
 }
 
-TEST_F(FairShare, CallsOfAClientWithManyAreMarked) {
+TEST_F(FairShare, CallsOfABusyClientAreMarked) {
   Begin(Limits());
   for (uint64_t i = 0; i < Admission::kBusyCalls; ++i) {
     EXPECT_EQ(Refusal(Rpc::kCheckCollision, "a"), "");

@@ -123,7 +123,7 @@ class RegistryRecords : public ::testing::Test {
   Registry registry_{store_, limits_, writers_};
 };
 
-TEST_F(RegistryRecords, TheStartReadsNothing) {
+TEST_F(RegistryRecords, StartupReadsNoRecords) {
   Start(1000);
   EXPECT_EQ(store_.queries, 0);
   EXPECT_EQ(registry_.Sizes().hull_count, VastStore::kHulls);
@@ -175,7 +175,7 @@ TEST_F(RegistryRecords, TheCacheStaysWithinItsLimit) {
 }
 
 // A call may name more records than the cache holds.
-TEST_F(RegistryRecords, ACallMayNameMoreThanAreKept) {
+TEST_F(RegistryRecords, ACallMayNameMoreRecordsThanTheCacheHolds) {
   Start(10);
   ExpectThere(Ids(0, 3000));
 }
@@ -236,7 +236,7 @@ TEST_F(RegistryRecords, ABodyInUseStaysCached) {
   EXPECT_EQ(registry_.records().FindBodies(ids).bodies.front(), held.bodies.front());
 }
 
-TEST_F(RegistryRecords, ACallMayNameMoreBodiesThanAreKept) {
+TEST_F(RegistryRecords, ACallMayNameMoreBodiesThanTheCacheHolds) {
   Start(10);
   ExpectBodies(Ids(0, 3000, "b"));
 }

@@ -280,7 +280,7 @@ TEST_F(RegistryTest, PreparationPrecedesOnlyWaitingQueries) {
 }
 
 // Each chunk covers all earlier points. No reader queries it.
-TEST_F(RegistryTest, FormerVerticesLeaveMemory) {
+TEST_F(RegistryTest, ReplacedVerticesAreFreed) {
   constexpr int kVertices = 100;
   constexpr uint64_t kChunks = 1000;
   const AppendSession session = Open("h");

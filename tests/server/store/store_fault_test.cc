@@ -326,7 +326,7 @@ TEST_F(StoreFault, AFailedFirstChangeKeepsTheStoreId) {
   EXPECT_EQ(hulls_->View("h")->record.vertex_count, 8);
 }
 
-TEST_F(StoreFault, AFileNamedLikeOurProbeOutlivesARepair) {
+TEST_F(StoreFault, RecoveryKeepsAFileNamedLikeItsProbe) {
   Start();
   const std::string path = directory_ + "/data/probe";
   std::ofstream(path) << "mine";

@@ -195,7 +195,7 @@ TEST_F(HullTableTest, AnIdleLargeHullStaysAwake) {
   EXPECT_TRUE(IsAwake("x"));
 }
 
-TEST_F(HullTableTest, ManyIdleHullsComeToRestOverSeveralHolds) {
+TEST_F(HullTableTest, ManyIdleHullsComeToRestOverSeveralCriticalSections) {
   constexpr int kHulls = 300;
   for (int i = 0; i < kHulls; ++i) Cube("h" + std::to_string(i));
   PassTime();
@@ -203,7 +203,7 @@ TEST_F(HullTableTest, ManyIdleHullsComeToRestOverSeveralHolds) {
   EXPECT_LE(mutex_.Statistics().max_lookups, kMaxLookupsPerHold);
 }
 
-TEST_F(HullTableTest, AHullThatWasInUseForLongRestsAfterwards) {
+TEST_F(HullTableTest, AHullComesToRestAfterLongUse) {
   auto used = Cube("a");
   for (int i = 0; i < 3; ++i) PassTime();
   EXPECT_TRUE(IsAwake("a"));

@@ -265,7 +265,7 @@ TEST_F(CommitterTest, ChangesSubmittedByACompletionSurviveTheRefusalOfItsBatch) 
   EXPECT_FALSE(committer_.Statistics().failing);
 }
 
-TEST_F(CommitterTest, AStoreThatRecoveredNoLongerFails) {
+TEST_F(CommitterTest, ARecoveredStoreNoLongerFails) {
   GatedStore::Gate gate;
   store_.Close(gate);
   gate.outcome.set_value(absl::UnavailableError("no disk"));

@@ -85,7 +85,7 @@ TEST_F(MemoryBudgetTest, TheLeastRecentlyUsedIsEvictedFirstAndNoMoreThanNeeded) 
   EXPECT_EQ(budget_.Statistics().evictions, 1);
 }
 
-TEST_F(MemoryBudgetTest, ItemsInUseStayAndAreTriedAgain) {
+TEST_F(MemoryBudgetTest, AccountsInUseStayAndAreVisitedAgain) {
   Owner busy(*this, 1, 60);
   Owner idle(*this, 2);
   busy.account.Set(60, false);
@@ -106,7 +106,7 @@ TEST_F(MemoryBudgetTest, ItemsInUseStayAndAreTriedAgain) {
 }
 
 // An owner that cannot evict is asked again only after all others; one eviction asks only a few.
-TEST_F(MemoryBudgetTest, AnEvictionTriesABoundedNumber) {
+TEST_F(MemoryBudgetTest, AnEvictionVisitsABoundedNumberOfAccounts) {
   std::vector<std::unique_ptr<Owner>> owners;
   for (int i = 0; i < 200; ++i) {
     owners.push_back(std::make_unique<Owner>(*this, i, i < 150 ? 1 : 0));

@@ -448,7 +448,7 @@ TEST_F(PostgresShared, ALateCommitIsAwaited) {
   EXPECT_EQ(Received(*hulls_, "h"), 9);
 }
 
-TEST_F(PostgresShared, ACommitAfterItsTurnChangesNothing) {
+TEST_F(PostgresShared, ALateCommitChangesNothing) {
   Start();
   const Server other = StartPeer();
   auto put = PutAPointWhoseCommitIsHeld();
@@ -463,7 +463,7 @@ TEST_F(PostgresShared, ACommitAfterItsTurnChangesNothing) {
   EXPECT_EQ(Received(*other, "h"), 10);
 }
 
-TEST_F(PostgresShared, ALateRequestForTheTurnChangesNothing) {
+TEST_F(PostgresShared, ALateRequestForTheCommitLockChangesNothing) {
   Start();
   const Server other = StartPeer();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
