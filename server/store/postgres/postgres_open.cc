@@ -287,9 +287,9 @@ absl::StatusOr<std::unique_ptr<Session>> PostgresStore::OpenReader() const {
 
 // The database ends this session, and with it this server's claim, after several missed heartbeats.
 absl::StatusOr<std::unique_ptr<Session>> PostgresStore::OpenKeeper() const {
-  const auto patience = 10 * options_.heartbeat;
+  const auto idle_timeout = 10 * options_.heartbeat;
   return OpenSession(absl::StrCat("SET statement_timeout = ", options_.answer_timeout.count(),
-                                  "; SET idle_session_timeout = ", patience.count()));
+                                  "; SET idle_session_timeout = ", idle_timeout.count()));
 }
 
 // Its transactions do not wait for the disk because notices need not be durable.

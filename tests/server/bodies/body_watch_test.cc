@@ -185,7 +185,7 @@ TEST_F(BodyWatches, CollisionsFollowMotionPiecesAndTheirHulls) {
   EXPECT_EQ(told.events(0).revision_a(), put->body().revision());
   ASSERT_EQ(told.piece_hulls_size(), 1);
   EXPECT_EQ(told.piece_hulls(0).hull_id(), "block");
-  // Former pieces are no longer followed.
+  // Pieces that were removed are no longer followed.
   Grow("cube", {9, 9, 9});
   Grow("block", {0.5, 0.5, 4});
   told = Change(*watch);

@@ -359,7 +359,7 @@ TEST_F(StoreFault, AnUnreadableStoreIsNotCopied) {
   EXPECT_EQ(directories(), before);
 }
 
-// Its former revisions may be assigned to other changes.
+// Its lost revisions may be assigned to other changes.
 TEST_F(StoreFault, ARelaxedStoreGetsANewIdAfterAnOutage) {
   durability_ = Durability::kRelaxed;
   sync_interval_ = std::chrono::hours(1);

@@ -129,8 +129,8 @@ TEST_F(PostgresFault, AnUnreachableDatabaseRefusesOnlyChanges) {
     proxy_->SetDown(false);
   }
   EXPECT_GT(hulls_->store().failures().write, 0);
-  // The stream continues without a restart. On a busy machine, a connection takes longer than the
-  // store's patience.
+  // The stream continues without a restart. On a busy machine, connecting takes longer than the
+  // store keeps trying.
   auto accepted = hulls_->Append(session, 2, {{9, 9, 9}});
   while (absl::IsUnavailable(accepted.status())) {
     accepted = hulls_->Append(session, 2, {{9, 9, 9}});
