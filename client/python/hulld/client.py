@@ -562,7 +562,7 @@ class Client(ClientBase):
         groups: the group of each placement; with ignore_same_group, pairs within a group are
         skipped, and so are pairs between two groups listed in ignored_group_pairs (k x 2). movers:
         only pairs with at least one of the first `movers` placements. Other arguments are as in
-        check_collisions; with a clearance, all pairs within it are found. limit: returns only
+        check_collisions; with a clearance, all pairs within it are found. limit: returns at most
         this many pairs, those with the smallest separation, nearest first, with their separations;
         without a clearance, chosen from all pairs. The totals still count every pair within the
         clearance. Pairs without an answer follow, at most the same number. first_only: returns only

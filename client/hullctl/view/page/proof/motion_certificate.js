@@ -277,7 +277,8 @@ function checkBodies(relation, contact, certificates, a, b) {
       pair.checkIntervals(contact, intervals);
       if (own === 'RELATION_SEPARATED') return;
       require(
-          contact.contactTime !== undefined, 'the pieces are in contact, but the answer has no contact_time');
+          contact.contactTime !== undefined,
+          'the pieces are in contact, but the answer has no contact_time');
       pair.checkContact(own, contact, certificate);
     });
     require(!problem, name + problem);
