@@ -268,15 +268,15 @@ Judgement JudgeMotion(const JudgedAnswer& answer, const AnswerRow& row, double m
   const v1::FirstContact& truth = *row.first_contact;
   const bool touches = truth.has_contact_time();
   // A program may state its answer in several columns; each must be correct.
-  const bool says_contact =
+  const bool claims_contact =
       answer.contact_time || answer.colliding.value_or(false) ||
       answer.relation.value_or(v1::RELATION_SEPARATED) != v1::RELATION_SEPARATED;
-  const bool says_none =
+  const bool claims_no_contact =
       (answer.colliding && !*answer.colliding) || answer.relation == v1::RELATION_SEPARATED;
   const double said = answer.contact_time.value_or(1);
   // The end of the bracket; 1 without contact.
   const double contact = touches ? truth.contact_time() : 1;
-  if (touches ? says_none : says_contact) {
+  if (touches ? claims_no_contact : claims_contact) {
     judgement.faults.push_back(touches ? Fault::kMiss : Fault::kFalseContact);
     judgement.error = touches ? 1 - contact : 1 - said;
   }

@@ -231,7 +231,7 @@ absl::Status RobotCheck::CheckWaypoints(CheckScope scope) {
     for (const Waypoint& values : waypoints) {
       model_.AppendPoses(arguments_.X_WB, AllJointValues(model_.robot, values), &poses);
     }
-    HULLD_RETURN_IF_ERROR(stream.Ask(waypoints.size(), poses));
+    HULLD_RETURN_IF_ERROR(stream.Query(waypoints.size(), poses));
     checked_ += waypoints.size();
     bar_.Update(checked_ * pairs_.size() / 2);
   }

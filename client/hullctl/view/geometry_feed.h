@@ -29,7 +29,7 @@ class GeometryFeed {
 
   // Switches to another scene; drops pending requests.
   void Show(const ShapeFiles& files);
-  void Ask(const std::vector<ShapeRequest>& shapes);
+  void Request(const std::vector<ShapeRequest>& shapes);
 
  private:
   void Run(const std::stop_token& stop);

@@ -76,7 +76,7 @@ class Surface {
     size_t cell = 0;
     if (directions_) {
       const DirectionMap::Place place = directions_->PlaceOf(point);
-      ++asked_;
+      ++tested_;
       if (directions_->IsCertainlyInside(place)) {
         ++rejected_;
         return;
@@ -171,11 +171,11 @@ class Surface {
   bool MeasureBefore(const VertexTable& vertices, size_t points, double fineness,
                      double walks_per_point, StopPoll& poll, TriangleCones* cones);
   // Returns false if the map rejected too few of the points looked up since the last measurement.
-  bool IsMapWorthwhile() const { return 8 * rejected_ >= asked_; }
+  bool IsMapWorthwhile() const { return 8 * rejected_ >= tested_; }
   // Records the number of points looked up in the map and rejected by it, as a measure of its
   // value.
-  void CountRejected(size_t asked, size_t rejected) {
-    asked_ += asked;
+  void CountRejected(size_t tested, size_t rejected) {
+    tested_ += tested;
     rejected_ += rejected;
   }
 
@@ -339,7 +339,7 @@ class Surface {
     size_t alive;
     double extent;
     size_t next_update;
-    size_t asked;
+    size_t tested;
     size_t rejected;
     size_t measured_at;
     size_t joined;
@@ -368,7 +368,7 @@ class Surface {
   size_t next_update_ = 0;
   // Number of points looked up in the map since the last measurement, and number of these that it
   // rejected.
-  size_t asked_ = 0;
+  size_t tested_ = 0;
   size_t rejected_ = 0;
   // Number of triangles at the last measurement.
   size_t measured_at_ = 0;

@@ -146,7 +146,7 @@ absl::Status BodySearch::Search() {
   if (!candidates_.empty()) {
     const Candidate candidate = candidates_.back();
     candidates_.pop_back();
-    if (candidate.gap <= Limit()) return Ask(candidate);
+    if (candidate.gap <= Limit()) return Query(candidate);
   } else if (!waiting_.empty()) {
     const Nodes nodes = waiting_.back();
     waiting_.pop_back();
@@ -215,7 +215,7 @@ void BodySearch::EnterLeaves(const Nodes& nodes) {
   });
 }
 
-absl::Status BodySearch::Ask(const Candidate& candidate) {
+absl::Status BodySearch::Query(const Candidate& candidate) {
   const PlacedHull& x = leaf_x_.At(*x_, candidate.slot_x, candidate.piece_x);
   const PlacedHull& y = leaf_y_.At(*y_, candidate.slot_y, candidate.piece_y);
   const bool swapped = x_ != a_;

@@ -109,7 +109,7 @@ class BodySearch {
   void EnterLeaves(const Nodes& nodes);
   absl::Status Search();
   absl::Status Prove();
-  absl::Status Ask(const Candidate& candidate);
+  absl::Status Query(const Candidate& candidate);
   void TakeUp(const Answer& answer, PiecePair pieces);
   void TakeUpSeparation(const Answer& answer, PiecePair pieces);
   absl::StatusOr<BodyAnswer> TakeLeast() const;
