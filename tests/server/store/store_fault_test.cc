@@ -491,17 +491,17 @@ TEST_F(StoreFault, NoAckPrecedesItsSync) {
     if (!store.ok()) break;
     DurableRegistry survivors(*std::move(store));
     EXPECT_TRUE(survivors.loaded().ok());
-    for (const auto& [id, told] : acked) {
+    for (const auto& [id, ack] : acked) {
       const auto view = survivors.View(id);
       EXPECT_TRUE(view.ok()) << view.status();
       if (!view.ok()) continue;
-      EXPECT_GE(survivors.Open(id)->last_sequence, told.sequence);
-      EXPECT_GE(view->record.revision, told.revision);
+      EXPECT_GE(survivors.Open(id)->last_sequence, ack.sequence);
+      EXPECT_GE(view->record.revision, ack.revision);
       EXPECT_GE(view->record.revision, last_revision[id]);
-      EXPECT_GE(view->record.counts.received, told.received);
+      EXPECT_GE(view->record.counts.received, ack.received);
       EXPECT_TRUE(AuditHull(CanonicalOf(*view)).ok());
-      last_revision[id] = told.revision;
-      chunks = std::max(chunks, told.sequence);
+      last_revision[id] = ack.revision;
+      chunks = std::max(chunks, ack.sequence);
     }
   }
   ending = true;

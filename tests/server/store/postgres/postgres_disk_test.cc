@@ -37,8 +37,8 @@ class PostgresDisk : public ::testing::TestWithParam<bool> {
     if (!machine_->log.is_mounted() || !machine_->tables.is_mounted()) return;
     machine_->cluster =
         std::make_unique<PostgresCluster>(PostgresCluster::WalIn{machine_->log.directory()});
-    cluster().Ask("postgres", absl::StrCat("CREATE TABLESPACE small LOCATION '",
-                                           machine_->tables.directory(), "'"));
+    cluster().RunSql("postgres", absl::StrCat("CREATE TABLESPACE small LOCATION '",
+                                              machine_->tables.directory(), "'"));
   }
   static void TearDownTestSuite() { delete std::exchange(machine_, nullptr); }
   static PostgresCluster& cluster() { return *machine_->cluster; }
