@@ -65,11 +65,11 @@ absl::StatusOr<v1::SaveBackupResponse> ReadPart(std::istream& file) {
   uint32_t size = 0;
   uint32_t checksum = 0;
   if (!ReadNumber(file, &size) || !ReadNumber(file, &checksum)) {
-    return Damaged("it is truncated: its end is missing");
+    return Damaged("it is truncated");
   }
   if (size > kMaxPartBytes) return Damaged("a part has an impossible size");
   std::string bytes(size, '\0');
-  if (!file.read(bytes.data(), size)) return Damaged("it is truncated: its end is missing");
+  if (!file.read(bytes.data(), size)) return Damaged("it is truncated");
   v1::SaveBackupResponse part;
   if (Checksum(bytes) != checksum || !part.ParseFromString(bytes)) {
     return Damaged("the checksum of a part does not match");
@@ -193,10 +193,10 @@ absl::Status Restore(std::ifstream& file, const fs::path& target, BackupCheck* c
 
 absl::Status BackupCheck::Take(const v1::SaveBackupResponse& part) {
   if (complete_) return Damaged("data follows its end");
-  if (!begun_ && !part.has_begin()) return Damaged("its beginning is missing");
+  if (!begun_ && !part.has_begin()) return Damaged("its header is missing");
   switch (part.part_case()) {
     case v1::SaveBackupResponse::kBegin:
-      if (std::exchange(begun_, true)) return Damaged("it has two beginnings");
+      if (std::exchange(begun_, true)) return Damaged("it has two headers");
       begin_ = part.begin();
       return absl::OkStatus();
     case v1::SaveBackupResponse::kPiece:
@@ -271,7 +271,7 @@ absl::Status BackupWriter::Write(const v1::SaveBackupResponse& part) {
 }
 
 absl::Status BackupWriter::Finish() {
-  if (!check_.complete()) return Damaged("it is truncated: its end is missing");
+  if (!check_.complete()) return Damaged("it is truncated");
   file_.close();
   std::error_code error;
   if (!file_ || !SyncPath(partial_path_)) {

@@ -43,16 +43,16 @@ CollisionStream::~CollisionStream() {
 absl::StatusOr<v1::StreamCollisionsResponse> CollisionStream::Open(v1::CollisionStreamOpen open) {
   if (freshness_.has_value() && !open.has_freshness()) *open.mutable_freshness() = *freshness_;
   *request_.mutable_open() = std::move(open);
-  return Ask();
+  return Exchange();
 }
 
 absl::StatusOr<v1::StreamCollisionsResponse> CollisionStream::Update(
     v1::CollisionStreamUpdate update) {
   *request_.mutable_update() = std::move(update);
-  return Ask();
+  return Exchange();
 }
 
-absl::StatusOr<v1::StreamCollisionsResponse> CollisionStream::Ask() {
+absl::StatusOr<v1::StreamCollisionsResponse> CollisionStream::Exchange() {
   std::unique_lock lock(mutex_);
   if (!held_ || reads_ended_) {
     lock.unlock();

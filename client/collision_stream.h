@@ -37,7 +37,7 @@ class CollisionStream final
   absl::Status Close();
 
  private:
-  absl::StatusOr<v1::StreamCollisionsResponse> Ask();
+  absl::StatusOr<v1::StreamCollisionsResponse> Exchange();
   void ReleaseHold();
   absl::Status Ended();
   absl::Status WaitUntilDone();

@@ -142,11 +142,11 @@ mesh_scenes() {
   heading "Two copies of Spider"
   ask SEPARATED "far apart?" spider spider --pose-b 1000,0,0
   ask OVERLAPPING "overlapping plainly?" spider spider --pose-b 10,5,0
-  ask OVERLAPPING "overlapping barely, by a part in 10^12?" \
+  ask OVERLAPPING "overlapping barely, by one part in 10^12?" \
     spider spider --pose-b "$(turned_about spider 1e-12)"
   ask TOUCHING "exactly at the boundary, where they share one vertex?" \
     spider spider --pose-b "$(turned_about spider 0)"
-  ask SEPARATED "apart by a part in 10^12?" spider spider --pose-b "$(turned_about spider -1e-12)"
+  ask SEPARATED "apart by one part in 10^12?" spider spider --pose-b "$(turned_about spider -1e-12)"
 
   heading "Two copies of Wuson"
   ask TOUCHING "exactly at the boundary, where they share one vertex?" \

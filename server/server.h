@@ -66,9 +66,10 @@ class Server {
   // `timeout`.
   bool WaitIdle(std::chrono::milliseconds timeout);
 
-  // Ends serving: BeginDrain; stops listening; asks clients to use another connection for their
-  // next calls (HTTP/2's GOAWAY), so that clients with several servers go elsewhere; waits for the
-  // running calls, and cancels them after `timeout`. Returns true if none was cancelled.
+  // Shuts down gracefully: calls BeginDrain, stops listening, asks clients to use another
+  // connection for their next calls (GOAWAY of HTTP/2, so that clients with several servers go
+  // elsewhere), waits for the running calls, and cancels them after `timeout`. Returns true if none
+  // was cancelled.
   bool Drain(std::chrono::milliseconds timeout);
 
  private:

@@ -28,7 +28,7 @@ v1::ErrorReason ReasonOf(const absl::Status& status);
 // the server did not send it.
 std::optional<std::string> MetadataOf(const absl::Status& status, const std::string& key);
 
-// Returns the ID of the failed call in the server's log; empty if unknown.
+// Returns the request ID under which the server logged the failed call; empty if unknown.
 std::string RequestIdOf(const absl::Status& status);
 
 // Returns the delay that the server requests before a retry; nullopt if the server did not suggest

@@ -21,9 +21,9 @@ bool MayRetry(const absl::Status& status) {
 bool WaitBeforeRetry(const RetryPolicy& policy, int failures, Deadline deadline,
                      const absl::Status& status) {
   if (failures >= policy.max_attempts) return false;
-  const std::chrono::milliseconds asked =
+  const std::chrono::milliseconds requested =
       RetryHintOf(status).value_or(std::chrono::milliseconds(0));
-  const std::chrono::milliseconds backoff = std::max(BackoffAfter(policy, failures), asked);
+  const std::chrono::milliseconds backoff = std::max(BackoffAfter(policy, failures), requested);
   if (policy.Now() + backoff >= deadline) return false;
   if (policy.wait) {
     policy.wait(backoff);

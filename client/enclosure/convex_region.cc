@@ -172,7 +172,7 @@ absl::StatusOr<ConvexRegion> ConvexRegion::Make(const HullMesh& mesh, const Comm
         fits ? std::span(mesh.facet_indices).subspan(begin, size) : std::span<const uint32_t>();
     const auto is_vertex = [&](uint32_t index) { return index < vertices.size(); };
     if (!fits || !std::all_of(facet.begin(), facet.end(), is_vertex)) {
-      return absl::InternalError("a facet of the hull does not fit its vertices");
+      return absl::InternalError("a facet of the hull does not match its vertices");
     }
     if (is_flat) {
       maker.AddPolygon(facet);

@@ -210,13 +210,13 @@ class Cover {
     std::vector<const HalfSpace*> cutting;
     for (const HalfSpace& half : region.half_spaces()) {
       int least = 1;
-      int most = -1;
+      int max_side = -1;
       for (const uint32_t v : triangle) {
         const int side = half.Side(mesh_.vertices[v], on_grid_[v]);
         least = std::min(least, side);
-        most = std::max(most, side);
+        max_side = std::max(max_side, side);
       }
-      if (most <= 0) continue;
+      if (max_side <= 0) continue;
       if (least >= 0) return;
       cutting.push_back(&half);
     }

@@ -25,8 +25,8 @@ enum class NumberText {
 // infinity and NaN. Independent of the locale.
 NumberText ParseDouble(std::string_view text, double* value);
 
-// Parses a coordinate of a file: as ParseDouble, but the letter of the exponent may also be D, as
-// Fortran writes it.
+// Parses a coordinate in a file. Like ParseDouble, but the letter of the exponent may also be D, as
+// in Fortran.
 NumberText ParseCoordinate(std::string_view text, double* value);
 
 // Parses an unsigned decimal number that fits in 64 bits.

@@ -37,7 +37,7 @@ absl::Status CheckVertex(uint32_t index, bool has_vertex, const v1::Vector3& ver
                          const ExactHull& hull, const std::string& name) {
   const std::span<const double> xyz = hull.xyz;
   if (index >= xyz.size() / 3 && hull.in_any_order) {
-    return ProofFails(absl::StrCat(name, " is none of the points of its inline shape"));
+    return ProofFails(absl::StrCat(name, " is not one of the points of its inline shape"));
   }
   if (index >= xyz.size() / 3) {
     return ProofFails(
@@ -73,11 +73,11 @@ v1::Certificate Located(v1::Certificate certificate, const ExactHull& a, const E
   return certificate;
 }
 
-absl::Status CheckPairs(const v1::Certificate& certificate, int most, const ExactHull& a,
+absl::Status CheckPairs(const v1::Certificate& certificate, int max_pairs, const ExactHull& a,
                         const ExactHull& b) {
-  if (certificate.pairs_size() > most) {
+  if (certificate.pairs_size() > max_pairs) {
     return ProofFails(absl::StrCat("the certificate has ", certificate.pairs_size(),
-                                   " vertex pairs; its relation allows ", most));
+                                   " vertex pairs; its relation allows ", max_pairs));
   }
   for (int i = 0; i < certificate.pairs_size(); ++i) {
     const v1::VertexPair& pair = certificate.pairs(i);
@@ -190,10 +190,10 @@ absl::Status CheckRelation(v1::Relation relation) {
   return ProofFails(absl::StrCat(v1::Relation_Name(relation), " has no certificate"));
 }
 
-absl::StatusOr<std::vector<BigVector>> DifferencesOf(const v1::Certificate& given, int most,
+absl::StatusOr<std::vector<BigVector>> DifferencesOf(const v1::Certificate& given, int max_pairs,
                                                      const ExactHull& a, const ExactHull& b) {
   const v1::Certificate certificate = Located(given, a, b);
-  HULLD_RETURN_IF_ERROR(CheckPairs(certificate, most, a, b));
+  HULLD_RETURN_IF_ERROR(CheckPairs(certificate, max_pairs, a, b));
   std::vector<BigVector> differences;
   for (const v1::VertexPair& pair : certificate.pairs()) {
     differences.push_back(b.scale * a.World(pair.index_a()) - a.scale * b.World(pair.index_b()));

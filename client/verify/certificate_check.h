@@ -34,13 +34,14 @@ absl::Status CheckExactly(v1::Relation relation, const v1::Certificate& certific
 absl::Status ReadDirection(const v1::Certificate& certificate, BigVector* n,
                            int* exponent = nullptr);
 
-// Limit of the contract: Caratheodory's number for a point of a hull.
+// The limit of the contract, by Caratheodory's theorem for a point of a hull.
 inline constexpr int kMaxTouchingPairs = 4;
 
 // Returns the points of A - B that the vertex pairs represent, times both scales.
-// FAILED_PRECONDITION: more than `most` pairs, or one that names no vertex.
-absl::StatusOr<std::vector<BigVector>> DifferencesOf(const v1::Certificate& certificate, int most,
-                                                     const ExactHull& a, const ExactHull& b);
+// FAILED_PRECONDITION: more than `max_pairs` pairs, or an index that is out of range.
+absl::StatusOr<std::vector<BigVector>> DifferencesOf(const v1::Certificate& certificate,
+                                                     int max_pairs, const ExactHull& a,
+                                                     const ExactHull& b);
 
 // Returns the sign of min n.B - max n.A - r |n|, r the sum of the radii.
 int GapSign(const ExactHull& a, const ExactHull& b, const BigVector& n);

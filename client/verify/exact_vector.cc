@@ -56,8 +56,8 @@ class Ball {
   Ball(const BigInteger& r_squared, bool nearer) : r_squared_(r_squared), nearer_(nearer) {}
 
   bool Contains(const BigInteger& numerator, const BigInteger& denominator) const {
-    const BigInteger most = r_squared_ * denominator;
-    return nearer_ ? numerator < most : numerator <= most;
+    const BigInteger limit = r_squared_ * denominator;
+    return nearer_ ? numerator < limit : numerator <= limit;
   }
   // The point of an edge nearest to 0, if it is inside the edge.
   bool MeetsEdge(const BigVector& a, const BigVector& b) const {

@@ -361,7 +361,8 @@ absl::Status CheckTimes(v1::Relation relation, const v1::FirstContact& contact) 
   }
   if (relation == v1::RELATION_SEPARATED) {
     if (until == 1 && !contact.has_contact_time()) return absl::OkStatus();
-    return ProofFails("the pair is SEPARATED, but not until 1, or it has a contact_time");
+    return ProofFails(
+        "the pair is SEPARATED, but separated_until is not 1, or there is a contact_time");
   }
   if (!contact.has_contact_time()) return ProofFails("the contact has no contact_time");
   const double time = contact.contact_time();
@@ -370,17 +371,17 @@ absl::Status CheckTimes(v1::Relation relation, const v1::FirstContact& contact) 
       absl::StrCat("contact_time is ", time, ", not between separated_until, ", until, ", and 1"));
 }
 
-// Accepts a width of at most `most`, and adjacent doubles.
-absl::Status CheckWidth(const v1::FirstContact& contact, double most) {
+// Accepts a width of at most `max_width`, and adjacent doubles.
+absl::Status CheckWidth(const v1::FirstContact& contact, double max_width) {
   const double until = contact.separated_until();
   const double time = contact.contact_time();
   CommonExponent exponent;
-  exponent.Include(std::array{until, time, most});
+  exponent.Include(std::array{until, time, max_width});
   const bool is_narrow =
-      exponent.ToInteger(time) - exponent.ToInteger(until) <= exponent.ToInteger(most);
+      exponent.ToInteger(time) - exponent.ToInteger(until) <= exponent.ToInteger(max_width);
   if (is_narrow || time <= std::nextafter(until, 2)) return absl::OkStatus();
   return absl::OutOfRangeError(absl::StrCat("the first contact is proven to be between ", until,
-                                            " and ", time, ", which are more than ", most,
+                                            " and ", time, ", which are more than ", max_width,
                                             " apart"));
 }
 
@@ -412,7 +413,7 @@ absl::Status CheckContact(v1::Relation relation, const MovingPair& pair,
   if (has_direction) return check(v1::RELATION_TOUCHING);
   if (!check(v1::RELATION_OVERLAPPING).ok()) return CheckBriefContact(pair, contact, certificate);
   if (relation == v1::RELATION_OVERLAPPING) return absl::OkStatus();
-  return ProofFails("the hulls overlap, so they do not only touch");
+  return ProofFails("the hulls overlap; they do not merely touch");
 }
 
 // Includes the lengths of both ends.
@@ -507,7 +508,8 @@ absl::Status CheckFirstContact(v1::Relation relation, const v1::FirstContact& co
     const bool is_known = of.piece_a() < a.size() && of.piece_b() < b.size() &&
                           !pieces_a.empty(of.piece_a()) && !pieces_b.empty(of.piece_b());
     if (!is_known || !proven.emplace(of.piece_a(), of.piece_b()).second) {
-      return ProofFails(absl::StrCat(name, "no such pieces, an empty one, or two certificates"));
+      return ProofFails(absl::StrCat(
+          name, "there is no such pair of nonempty pieces, or it has two certificates"));
     }
     const MovingPair pair = {pieces_a.At(of.piece_a(), lengths), pieces_b.At(of.piece_b(), lengths),
                              lengths};
@@ -515,7 +517,7 @@ absl::Status CheckFirstContact(v1::Relation relation, const v1::FirstContact& co
     if (checked.ok() && of.relation() != v1::RELATION_SEPARATED) {
       checked = contact.has_contact_time()
                     ? CheckContact(of.relation(), pair, contact, of.certificate())
-                    : ProofFails("they are in contact, but there is no contact_time");
+                    : ProofFails("the pieces are in contact, but the answer has no contact_time");
       shown = std::max(shown, of.relation());
     }
     if (!checked.ok()) return ProofFails(absl::StrCat(name, checked.message()));

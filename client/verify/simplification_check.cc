@@ -108,11 +108,11 @@ struct Measure {
 };
 
 // A hull prepared for point queries.
-class AskedHull {
+class PreparedHull {
  public:
   // Both must outlive the result. FAILED_PRECONDITION: facets that do not match the vertices.
-  static absl::StatusOr<AskedHull> Make(const HullMesh& mesh, const Measure& measure) {
-    AskedHull hull(measure);
+  static absl::StatusOr<PreparedHull> Make(const HullMesh& mesh, const Measure& measure) {
+    PreparedHull hull(measure);
     for (size_t i = 0; i < mesh.vertex_count(); ++i) {
       const Point3 p = PointAt(mesh.xyz, i);
       hull.vertices_.push_back(hull.OnGrid(p));
@@ -155,7 +155,7 @@ class AskedHull {
   }
 
  private:
-  explicit AskedHull(const Measure& measure) : measure_(measure) {}
+  explicit PreparedHull(const Measure& measure) : measure_(measure) {}
 
   // Adding 0 turns -0 into 0.
   static Point3 Key(const Point3& p) { return {p[0] + 0, p[1] + 0, p[2] + 0}; }
@@ -218,25 +218,26 @@ class AskedHull {
   std::optional<TriangleTree> tree_;
 };
 
-absl::Status CheckHeader(const v1::Simplification& asked, const HullMesh& simplified) {
-  if (!simplified.header.has_error()) return NotShown("the reply states no error");
+absl::Status CheckHeader(const v1::Simplification& requested, const HullMesh& simplified) {
+  if (!simplified.header.has_error()) return NotShown("the reply contains no error");
   const double error = simplified.header.error();
   if (std::isnan(error) || error < 0) {
     return NotShown(absl::StrCat("the error is ", Text(error), ", which is not a distance"));
   }
-  if (asked.max_vertices() > 0 && simplified.vertex_count() > asked.max_vertices()) {
+  if (requested.max_vertices() > 0 && simplified.vertex_count() > requested.max_vertices()) {
     return NotShown(absl::StrCat("the simplification has ", simplified.vertex_count(),
-                                 " vertices; at most ", asked.max_vertices(), " were requested"));
+                                 " vertices; at most ", requested.max_vertices(),
+                                 " were requested"));
   }
-  if (asked.max_vertices() == 0 && error > asked.max_error()) {
+  if (requested.max_vertices() == 0 && error > requested.max_error()) {
     return NotShown(absl::StrCat("the error is ", Text(error), "; at most ",
-                                 Text(asked.max_error()), " was requested"));
+                                 Text(requested.max_error()), " was requested"));
   }
   return absl::OkStatus();
 }
 
 absl::Status CheckInside(const HullMesh& hull, const HullMesh& simplified, double error,
-                         const AskedHull& of_hull, const AskedHull& of_simplified) {
+                         const PreparedHull& of_hull, const PreparedHull& of_simplified) {
   for (size_t i = 0; i < simplified.vertex_count(); ++i) {
     if (!of_hull.HasVertex(PointAt(simplified.xyz, i))) {
       return NotShown(
@@ -254,7 +255,7 @@ absl::Status CheckInside(const HullMesh& hull, const HullMesh& simplified, doubl
 }
 
 absl::Status CheckOutside(const HullMesh& hull, const HullMesh& simplified, double error,
-                          const AskedHull& of_hull, const AskedHull& of_simplified) {
+                          const PreparedHull& of_hull, const PreparedHull& of_simplified) {
   for (size_t i = 0; i < hull.vertex_count(); ++i) {
     if (!of_simplified.Contains(PointAt(hull.xyz, i))) {
       return NotShown(absl::StrCat("vertex ", i, " of the hull is not in the simplification"));
@@ -278,9 +279,9 @@ bool IsSameVersion(const v1::MeshHeader& a, const v1::MeshHeader& b) {
 
 }  // namespace
 
-absl::Status CheckSimplification(const v1::Simplification& asked, const HullMesh& hull,
+absl::Status CheckSimplification(const v1::Simplification& requested, const HullMesh& hull,
                                  const HullMesh& simplified) {
-  HULLD_RETURN_IF_ERROR(CheckHeader(asked, simplified));
+  HULLD_RETURN_IF_ERROR(CheckHeader(requested, simplified));
   if (hull.xyz.empty() != simplified.xyz.empty()) {
     return NotShown("one of hull and simplification is empty, and the other is not");
   }
@@ -292,9 +293,9 @@ absl::Status CheckSimplification(const v1::Simplification& asked, const HullMesh
   }
   const double error = simplified.header.error();
   const Measure measure(hull, simplified, error);
-  HULLD_ASSIGN_OR_RETURN(const auto of_hull, AskedHull::Make(hull, measure));
-  HULLD_ASSIGN_OR_RETURN(const auto of_simplified, AskedHull::Make(simplified, measure));
-  return asked.side() == v1::SIMPLIFICATION_SIDE_OUTSIDE
+  HULLD_ASSIGN_OR_RETURN(const auto of_hull, PreparedHull::Make(hull, measure));
+  HULLD_ASSIGN_OR_RETURN(const auto of_simplified, PreparedHull::Make(simplified, measure));
+  return requested.side() == v1::SIMPLIFICATION_SIDE_OUTSIDE
              ? CheckOutside(hull, simplified, error, of_hull, of_simplified)
              : CheckInside(hull, simplified, error, of_hull, of_simplified);
 }

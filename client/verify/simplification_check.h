@@ -27,7 +27,7 @@ namespace hulld {
 // tetrahedron of vertices contains it. Facets only guide the search: wrong facets can make the
 // check reject a true claim, but never accept a false one. Cost: about n log n, and about ten
 // microseconds of exact arithmetic per vertex.
-absl::Status CheckSimplification(const v1::Simplification& asked, const HullMesh& hull,
+absl::Status CheckSimplification(const v1::Simplification& requested, const HullMesh& hull,
                                  const HullMesh& simplified);
 
 // Fetches a simplification and its hull at the same revision and checks it; retries a few times

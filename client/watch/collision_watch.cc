@@ -64,10 +64,10 @@ void Apply(const v1::CollisionWatchUpdate& update, v1::CollisionWatchOpen* open)
 
 CollisionWatch::CollisionWatch(std::shared_ptr<v1::CollisionService::Stub> stub,
                                v1::CollisionWatchOpen open, RetryPolicy retry,
-                               std::chrono::milliseconds patience)
+                               std::chrono::milliseconds reconnect_timeout)
     : stub_(std::move(stub)),
       retry_(std::move(retry)),
-      patience_(patience),
+      reconnect_timeout_(reconnect_timeout),
       reported_(open),
       open_(std::move(open)) {}
 
@@ -96,7 +96,7 @@ absl::StatusOr<v1::WatchCollisionsResponse> CollisionWatch::Next() {
     call_.reset();
     // The deadline starts at the first failure, because the watch may have been quiet for hours
     // before.
-    if (failures == 0) deadline = retry.Now() + patience_;
+    if (failures == 0) deadline = retry.Now() + reconnect_timeout_;
     if (!MayRetry(status) || !WaitBeforeRetry(retry, ++failures, deadline, status)) return status;
   }
 }

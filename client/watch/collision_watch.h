@@ -23,10 +23,10 @@ namespace hulld {
 // by one thread, not necessarily the same one, and Cancel by any thread.
 class CollisionWatch {
  public:
-  // Next connects. patience: the time to reconnect to a lost server. The first call and refused
-  // calls are retried as `retry` specifies.
+  // Next connects. reconnect_timeout: limits the attempts to reconnect to a lost server. The first
+  // call and refused calls are retried as `retry` specifies.
   CollisionWatch(std::shared_ptr<v1::CollisionService::Stub> stub, v1::CollisionWatchOpen open,
-                 RetryPolicy retry, std::chrono::milliseconds patience);
+                 RetryPolicy retry, std::chrono::milliseconds reconnect_timeout);
   // Cancels the watch.
   ~CollisionWatch();
   CollisionWatch(const CollisionWatch&) = delete;
@@ -60,7 +60,7 @@ class CollisionWatch {
 
   const std::shared_ptr<v1::CollisionService::Stub> stub_;
   const RetryPolicy retry_;
-  const std::chrono::milliseconds patience_;
+  const std::chrono::milliseconds reconnect_timeout_;
 
   // Used by Next only.
   ReportedPairs reported_;

@@ -8,11 +8,11 @@
 namespace hulld {
 
 HullWatch::HullWatch(std::shared_ptr<v1::HullService::Stub> stub, v1::WatchHullsRequest request,
-                     RetryPolicy retry, std::chrono::milliseconds patience)
+                     RetryPolicy retry, std::chrono::milliseconds reconnect_timeout)
     : stub_(std::move(stub)),
       request_(std::move(request)),
       retry_(std::move(retry)),
-      patience_(patience) {}
+      reconnect_timeout_(reconnect_timeout) {}
 
 HullWatch::~HullWatch() {
   Cancel();
@@ -40,7 +40,7 @@ absl::StatusOr<v1::WatchHullsResponse> HullWatch::Next() {
     const absl::Status status = Close();
     // The deadline starts at the first failure, because the watch may have been quiet for hours
     // before.
-    if (failures == 0) deadline = retry.Now() + patience_;
+    if (failures == 0) deadline = retry.Now() + reconnect_timeout_;
     if (!MayRetry(status) || !WaitBeforeRetry(retry, ++failures, deadline, status)) return status;
   }
 }

@@ -19,10 +19,10 @@ namespace hulld {
 // thread, and Cancel by any thread.
 class HullWatch {
  public:
-  // Next connects. patience: the time to reconnect to a lost server. The first call and refused
-  // calls are retried as `retry` specifies.
+  // Next connects. reconnect_timeout: limits the attempts to reconnect to a lost server. The first
+  // call and refused calls are retried as `retry` specifies.
   HullWatch(std::shared_ptr<v1::HullService::Stub> stub, v1::WatchHullsRequest request,
-            RetryPolicy retry, std::chrono::milliseconds patience);
+            RetryPolicy retry, std::chrono::milliseconds reconnect_timeout);
   // Cancels the watch.
   ~HullWatch();
   HullWatch(const HullWatch&) = delete;
@@ -48,9 +48,9 @@ class HullWatch {
   const std::shared_ptr<v1::HullService::Stub> stub_;
   v1::WatchHullsRequest request_;
   const RetryPolicy retry_;
-  const std::chrono::milliseconds patience_;
-  // connected_: a message arrived, so a server was reached. reported_: events arrived that a
-  // restart must revoke.
+  const std::chrono::milliseconds reconnect_timeout_;
+  // connected_: true if a message has arrived, so a server was reached. reported_: true if events
+  // have arrived that a restart must revoke.
   bool connected_ = false;
   bool reported_ = false;
 

@@ -10,8 +10,8 @@
 
 namespace hulld {
 
-// A list of temporary elements that is refilled by successive tasks. It keeps its memory, and
-// leaves elements uninitialized until they are assigned. A copy is empty.
+// A list of temporary elements, reused by successive tasks. It keeps its memory, and leaves
+// elements uninitialized until they are assigned. A copy is empty.
 template <typename T>
 class ScratchList {
   static_assert(std::is_trivially_copyable_v<T>);

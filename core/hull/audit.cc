@@ -45,7 +45,7 @@ absl::Status Finding(const Parts&... parts) {
   return absl::InternalError(absl::StrCat(parts...));
 }
 
-absl::Status Stopped() { return absl::CancelledError("stopped in an audit"); }
+absl::Status Stopped() { return absl::CancelledError("the audit was cancelled"); }
 
 absl::Status CheckVertices(const Hull& hull, StopPoll& poll) {
   const std::span<const Vector> v = hull.vertices();

@@ -60,7 +60,9 @@ class SurfaceSum {
   }
 
  private:
-  static absl::Status Stopped() { return absl::CancelledError("stopped in a sum over a hull"); }
+  static absl::Status Stopped() {
+    return absl::CancelledError("computing the properties was cancelled");
+  }
 
   // Returns a vertex relative to the first.
   IntegerVector At(uint32_t i) const { return ToInteger(hull_.vertices()[i], exponent_) - origin_; }

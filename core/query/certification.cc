@@ -63,9 +63,9 @@ class Surrounding {
   // strictly inside A - B.
   absl::StatusOr<std::vector<VertexPair>> Find() {
     while (const std::optional<IntegerVector> n = Escape(corners_)) {
-      if (poll_.Step()) return absl::CancelledError("stopped in a certificate");
+      if (poll_.Step()) return absl::CancelledError("finding the certificate was cancelled");
       corners_.push_back(pair_.Farthest(*n));
-      if (pair_.stopped()) return absl::CancelledError("stopped in a certificate");
+      if (pair_.stopped()) return absl::CancelledError("finding the certificate was cancelled");
       // If the origin is strictly inside, the farthest vertex is outside the half-space.
       HULLD_CHECK(Sign(Dot(*n, corners_.back().w)) > 0);
     }
@@ -140,7 +140,7 @@ absl::StatusOr<Certificate> MakeCertificate(ExactPair& exact, const Decision& de
     const int sign = decision.relation == Relation::kSeparated ? -1 : 0;
     certificate.direction = Shortest(
         *n, [&](const IntegerVector& short_n) { return SignOfSupport(exact, short_n) <= sign; });
-    if (exact.stopped()) return absl::CancelledError("stopped in a certificate");
+    if (exact.stopped()) return absl::CancelledError("finding the certificate was cancelled");
   }
   const std::span<const VertexPair> known(decision.pairs.data(), decision.pair_count);
   if (decision.relation == Relation::kTouching) {
@@ -171,7 +171,7 @@ absl::StatusOr<Certificate> MakeRoundedCertificate(ExactPair& exact, Relation re
   };
   if (relation == Relation::kSeparated && !hint.isZero()) {
     const bool is_proof = proves(ExactlyOf(hint));
-    if (exact.stopped()) return absl::CancelledError("stopped in a certificate");
+    if (exact.stopped()) return absl::CancelledError("finding the certificate was cancelled");
     if (is_proof) {
       certificate.direction = hint;
       return certificate;
@@ -181,7 +181,7 @@ absl::StatusOr<Certificate> MakeRoundedCertificate(ExactPair& exact, Relation re
   if (!nearest.ok()) return nearest.status();
   if (relation != Relation::kOverlapping) {
     certificate.direction = Shortest(-PointOf(exact, nearest->point), proves);
-    if (exact.stopped()) return absl::CancelledError("stopped in a certificate");
+    if (exact.stopped()) return absl::CancelledError("finding the certificate was cancelled");
   }
   if (relation != Relation::kSeparated) certificate.pairs = std::move(nearest->point.pairs);
   return certificate;

@@ -172,7 +172,7 @@ absl::Status AddAxis(const FloatPair& pair, const ExactDirection& direction,
   if (!n) return absl::OkStatus();
   ExactPair exact(pair, options.should_stop);
   SeparatingAxis axis = DescribeAxis(exact, *n);
-  if (exact.stopped()) return absl::CancelledError("stopped in a query");
+  if (exact.stopped()) return absl::CancelledError("the query was cancelled");
   if (options.want_analysis) answer.analysis->stage = axis.kind;
   if (options.want_axis) answer.axis = std::move(axis);
   return absl::OkStatus();

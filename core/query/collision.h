@@ -29,7 +29,7 @@ absl::StatusOr<Answer> CheckCollision(const PlacedHull& a, const PlacedHull& b,
 // interleave other work between two steps.
 class TextbookCheck {
  public:
-  // All arguments must outlive the check. Requires: options.method is the textbook. Errors: as
+  // All arguments must outlive the check. Requires: options.method is the textbook. Errors: see
   // CheckCollision, except CANCELLED.
   static absl::StatusOr<TextbookCheck> Begin(const PlacedHull& a, const PlacedHull& b,
                                              const QueryOptions& options);

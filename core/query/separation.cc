@@ -100,8 +100,8 @@ class SeparationSearch {
   absl::Status AddValues(const SeparationRequest& request, SeparationAnswer& answer) {
     if (relation_ == Relation::kTouching) {
       if (request.separation) answer.separation = Separation{0, 0};
-      const double most = request.max_error.value_or(kDefaultRelativeMaxError * size_);
-      if (!request.witness || AddFloatContact(most, answer)) return absl::OkStatus();
+      const double max_error = request.max_error.value_or(kDefaultRelativeMaxError * size_);
+      if (!request.witness || AddFloatContact(max_error, answer)) return absl::OkStatus();
       return AddExactWitness(answer);
     }
     SeparationGoal goal;
@@ -146,11 +146,11 @@ class SeparationSearch {
       answer.within_clearance = *known;
       return absl::OkStatus();
     }
-    const LengthSum most = pair_.RadiiPlus(clearance);
-    const int sign = most.Sign();
+    const LengthSum limit = pair_.RadiiPlus(clearance);
+    const int sign = limit.Sign();
     int comparison = SignOf(core_) - sign;
     if (comparison == 0 && sign != 0) {
-      if (absl::Status s = CompareAbsolute(sign, most, comparison); !s.ok()) return s;
+      if (absl::Status s = CompareAbsolute(sign, limit, comparison); !s.ok()) return s;
       comparison *= sign;
     }
     answer.within_clearance = comparison <= 0;
@@ -158,7 +158,7 @@ class SeparationSearch {
   }
 
  private:
-  static absl::Status Stopped() { return absl::CancelledError("stopped in a query"); }
+  static absl::Status Stopped() { return absl::CancelledError("the query was cancelled"); }
 
   // Returns true if separation <= clearance, if the relation or an infinite clearance shows it.
   std::optional<bool> KnownWithin(double clearance) const {
@@ -336,12 +336,12 @@ class SeparationSearch {
     return true;
   }
 
-  // Adds a common point of touching cores. Returns false if its error may exceed `most`. The exact
-  // weights that combine the differences w_i of the pairs to 0 differ from the computed weights by
-  // d with |sum d_i (w_i - w_0)| = |v|, v being the computed combination. So |d| is at most |v|
-  // over the least singular value of the w_i - w_0, and the computed point of A misses the exact
-  // one, which is common, by at most |d| times the norm of the matrix of the a_i - a_0.
-  bool AddFloatContact(double most, SeparationAnswer& answer) const {
+  // Adds a common point of touching cores. Returns false if its error may exceed `max_error`. The
+  // exact weights that combine the differences w_i of the pairs to 0 differ from the computed
+  // weights by d with |sum d_i (w_i - w_0)| = |v|, v being the computed combination. So |d| is at
+  // most |v| over the least singular value of the w_i - w_0, and the computed point of A misses the
+  // exact one, which is common, by at most |d| times the norm of the matrix of the a_i - a_0.
+  bool AddFloatContact(double max_error, SeparationAnswer& answer) const {
     if (!radii_.is_zero() || start_count_ != 3 || !pair_.usable()) return false;
     std::array<VertexPair, 3> pairs = {start_pairs_[0], start_pairs_[1], start_pairs_[2]};
     const auto last =
@@ -376,7 +376,7 @@ class SeparationSearch {
     const Vector p = unit * contact + t;
     const double largest = std::max(p.cwiseAbs().maxCoeff(), t.cwiseAbs().maxCoeff());
     error = unit * error * (1 + 32 * kUnitRoundoff) + 4 * kUnitRoundoff * largest;
-    if (!std::isfinite(error) || error > most) return false;
+    if (!std::isfinite(error) || error > max_error) return false;
     answer.witness = Witness{p, p, error};
     return true;
   }
@@ -429,16 +429,16 @@ class SeparationSearch {
     std::array<PlainVector, 3> p;
     for (int i = 0; i < 3; ++i) p[i] = 1 / unit * pair_.Difference(bounds_.point.pairs[i]);
     const double turn = Dot(n, Cross(p[1] - p[0], p[2] - p[0])) > 0 ? 1 : -1;
-    double most = 0;
+    double reach = 0;
     double margin = kInfinity;
     for (int i = 0; i < 3; ++i) {
       const PlainVector& q = p[(i + 1) % 3];
-      most = std::max(most, Dot(n, p[i]));
+      reach = std::max(reach, Dot(n, p[i]));
       const double moment = turn * Dot(n, Cross(p[i], q)) - kEdgeMomentErrorFactor * size * size;
       margin = std::min(margin, moment / (Norm(q - p[i]) + kEdgeLengthErrorFactor * size));
     }
     const double gap =
-        apart ? most - bounds_.low / unit : 2 * (bounds_.high - bounds_.facet_low) / unit;
+        apart ? reach - bounds_.low / unit : 2 * (bounds_.high - bounds_.facet_low) / unit;
     const bool ahead = apart || bounds_.facet_low > kReachErrorFactor * pair_.size();
     if (!(margin > 0) || !ahead) return kInfinity;
     // A sine below 2^-19 is exceeded by its angle by less than 2^-39 of it.

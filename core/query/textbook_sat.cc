@@ -309,7 +309,7 @@ struct Scan {
   }
 };
 
-absl::Status Stopped() { return absl::CancelledError("stopped in textbook SAT"); }
+absl::Status Stopped() { return absl::CancelledError("textbook SAT was cancelled"); }
 
 absl::Status CheckCount(uint64_t count, const QueryOptions& options) {
   if (count <= options.max_textbook_axes) return absl::OkStatus();

@@ -34,7 +34,7 @@ class TextbookSearch {
  public:
   using Clock = std::chrono::steady_clock;
 
-  // All arguments must outlive the search. Errors: as TextbookSat.
+  // All arguments must outlive the search. Errors: see TextbookSat.
   static absl::StatusOr<TextbookSearch> Begin(const PlacedHull& a, const PlacedHull& b,
                                               const QueryOptions& options);
   TextbookSearch(TextbookSearch&&) noexcept;

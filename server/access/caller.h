@@ -14,7 +14,7 @@ namespace hulld::server {
 // Returns the name of the role with this permission: "none", "read-only", "read-write", or "admin".
 const char* RoleName(Permission permission);
 
-// The caller of a call, with its rights. The default is the caller of a server without tokens, with
+// The client that makes a call, and its rights. The default, used by a server without tokens, has
 // all rights.
 struct Caller {
   // The token's name, which is not secret; empty without tokens.
@@ -34,12 +34,12 @@ struct Caller {
 absl::Status CheckPermission(const Caller& caller, Rpc rpc);
 
 // Returns OK if `id` is well-formed and visible to the caller. Every hull ID of a request is
-// checked before it is looked up. INVALID_ARGUMENT: as CheckHullIdSyntax. PERMISSION_DENIED: it is
+// checked before it is looked up. INVALID_ARGUMENT: see CheckHullIdSyntax. PERMISSION_DENIED: it is
 // outside the caller's prefix, whether or not the hull exists.
 absl::Status CheckHullId(const Caller& caller, const std::string& id, const std::string& field);
 
-// Returns the narrower one of `prefix` and the caller's prefix. INVALID_ARGUMENT: `prefix` is
-// longer than any ID. PERMISSION_DENIED: no ID that starts with `prefix` is visible to the caller.
+// Returns the narrower of `prefix` and the caller's prefix. INVALID_ARGUMENT: `prefix` is longer
+// than any ID. PERMISSION_DENIED: no ID that starts with `prefix` is visible to the caller.
 absl::StatusOr<std::string> PrefixToList(const Caller& caller, const std::string& prefix);
 
 }  // namespace hulld::server

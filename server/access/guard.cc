@@ -112,7 +112,7 @@ absl::Status Guard::ReloadTls() {
   } else {
     tls_->SetIdentity(*std::move(loaded));
   }
-  spdlog::info("TLS certificate of {} in force, valid until {}", identity_.subject,
+  spdlog::info("using the TLS certificate of {}, valid until {}", identity_.subject,
                FormatTime(identity_.not_after));
   const absl::Status valid = CheckValidity(identity_, std::chrono::system_clock::now());
   if (!valid.ok()) spdlog::warn("{}", std::string(valid.message()));
@@ -143,7 +143,7 @@ absl::Status Guard::ReloadTokens() {
         "are refused; add a token with 'hullctl token new'",
         config_.tokens_file);
   } else {
-    spdlog::info("{} token{} in force", tokens->size(), tokens->size() == 1 ? "" : "s");
+    spdlog::info("loaded {} token{}", tokens->size(), tokens->size() == 1 ? "" : "s");
   }
   if (tokens_changed_) tokens_changed_();
   return absl::OkStatus();

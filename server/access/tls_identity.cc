@@ -59,7 +59,7 @@ absl::StatusOr<std::vector<Certificate>> ParseCertificates(const std::string& te
   return certificates;
 }
 
-// Refuses to give a passphrase for an encrypted key.
+// Supplies no passphrase, so that loading an encrypted key fails.
 int NoPassphrase(char*, int, int, void*) { return -1; }
 
 absl::StatusOr<Key> ParseKey(const std::string& text, const std::string& path) {

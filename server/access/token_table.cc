@@ -69,12 +69,12 @@ absl::Status TokenTable::AddLine(const std::string& line) {
   std::string more;
   if (!(words >> role >> prefix >> hash) || words >> more) {
     return absl::InvalidArgumentError(
-        "expected four words: name, role, prefix, and sha256:HASH, as 'hullctl token new' prints "
+        "expected four fields: name, role, prefix, and sha256:HASH, as 'hullctl token new' prints "
         "them");
   }
   if (!IsName(name)) {
     return absl::InvalidArgumentError(
-        "the name (first word) must have at most 64 characters of [A-Za-z0-9._-] and start with a "
+        "the name (first field) must have at most 64 characters of [A-Za-z0-9._-] and start with a "
         "letter or "
         "digit");
   }
@@ -83,7 +83,7 @@ absl::Status TokenTable::AddLine(const std::string& line) {
   const std::optional<Permission> permission = ReadRole(role);
   if (!permission.has_value()) {
     return absl::InvalidArgumentError(
-        "the role (second word) must be read-only, read-write, or admin");
+        "the role (second field) must be read-only, read-write, or admin");
   }
   entry.caller.permission = *permission;
   HULLD_ASSIGN_OR_RETURN(entry.caller.prefix, ReadPrefix(prefix));
@@ -92,7 +92,7 @@ absl::Status TokenTable::AddLine(const std::string& line) {
                        IsHex(hash.substr(sizeof kHashScheme - 1));
   if (!is_hash) {
     return absl::InvalidArgumentError(
-        "the hash (last word) must be sha256: and 64 hexadecimal digits; never store the token "
+        "the hash (last field) must be sha256: and 64 hexadecimal digits; never store the token "
         "itself ('hullctl token hash' prints its hash)");
   }
   const std::string bytes = absl::HexStringToBytes(hash.substr(sizeof kHashScheme - 1));

@@ -32,8 +32,8 @@ class TokenTable {
   // names the line; it never quotes a hash.
   static absl::StatusOr<TokenTable> Parse(const std::string& text);
 
-  // Returns the owner of the token, if any. Takes constant time with respect to the length of a
-  // matching hash prefix.
+  // Returns the owner of the token, if any. The duration does not reveal how much of a hash
+  // matches.
   std::optional<Caller> Find(const std::string& token) const;
 
   // Returns true if a token identifies this caller, with the same rights. Cost: O(tokens), a few
@@ -60,8 +60,8 @@ class TokenTable {
 };
 
 // Reads --tokens-file. may_be_empty: a missing file or one without a token results in an empty
-// table, as the last token may have been revoked. INVALID_ARGUMENT: as ReadSecretFile and
-// TokenTable::Parse, or the file contains no token and may not be empty.
+// table, as the last token may have been revoked. INVALID_ARGUMENT: see ReadSecretFile and
+// TokenTable::Parse; or the file contains no token although it may not be empty.
 absl::StatusOr<TokenTable> ReadTokensFile(const std::string& path, bool may_be_empty = false);
 
 }  // namespace hulld::server

@@ -78,7 +78,7 @@ UnaryReactor* HealthService::Check(CallContext* context, const Bytes* request, B
   UnaryReactor* const reactor = context->DefaultReactor();
   HealthCheckRequest message;
   RequestMemory::Share share;
-  Bytes bytes = TakenFrom(*request);
+  Bytes bytes = StealBytes(*request);
   const absl::Status parsed = ParseRequest(bytes, admission_.request_memory(), &message, share);
   if (!parsed.ok()) {
     reactor->Finish(ToGrpc(parsed));

@@ -141,7 +141,7 @@ absl::StatusOr<Admission::Ticket> Admission::Admit(const Arrival& arrival) {
     room = CheckRoom(arrival.rpc, before);
   }
   if (!room.ok()) return room;
-  ticket.is_one_of_many_ = before.calls >= kFewCalls;
+  ticket.is_client_busy_ = before.calls >= kBusyCalls;
   ticket.client_ =
       known != clients_.end()
           ? &*known

@@ -39,7 +39,7 @@ bool UsesWriters(Rpc rpc);
 // revoked token, and cancels overdue calls that neither end nor poll, for example because the
 // client stopped reading.
 //
-// Each client has a share of the calls, streams, and batches. A part of all calls, and of each
+// Each client has a share of the calls, streams, and batches. Part of the total, and of each
 // client's share, is reserved for single calls, so that long calls never crowd them out. Calls
 // without a token have a separate share, so that they never crowd out calls with a token; they do
 // not protect their connection from eviction. The first health watch of a connection counts toward
@@ -55,8 +55,8 @@ class Admission {
 
     // Client and connection charged for the call in fair scheduling of the threads.
     ClientId client() const;
-    // True if the client had more than kFewCalls running calls when this one was admitted.
-    bool is_one_of_many() const { return is_one_of_many_; }
+    // True if the client had more than kBusyCalls running calls when this one was admitted.
+    bool is_client_busy() const { return is_client_busy_; }
 
    private:
     friend class Admission;
@@ -94,7 +94,7 @@ class Admission {
     CallKind kind_;
     Clients::value_type* client_ = nullptr;
     Share share_ = Share::kCalls;
-    bool is_one_of_many_ = false;
+    bool is_client_busy_ = false;
     // The caller's connection in the ConnectionTable; 0 if unknown.
     uint64_t connection_ = 0;
     // Set for calls with a token, and for downloads and batches while --max-request-time limits
@@ -111,9 +111,9 @@ class Admission {
   // Requires that no call is running.
   ~Admission();
 
-  // Calls of a client with more running calls than this are not answered on arrival. They take
-  // turns in the pools, by client and by connection.
-  static constexpr uint64_t kFewCalls = 16;
+  // A client with more running calls than this is busy: its calls are not answered on arrival, but
+  // take turns in the pools, by client and by connection.
+  static constexpr uint64_t kBusyCalls = 16;
 
   const Limits& limits() const { return limits_; }
   const Guard* guard() const { return guard_; }
@@ -122,8 +122,8 @@ class Admission {
   // Memory of the admitted requests.
   RequestMemory& request_memory() { return request_memory_; }
 
-  // Sets the function that returns the length of the queue that a call would join, which
-  // --max-waiting-calls bounds. Requires: no call has arrived yet.
+  // Sets the function that returns the length of the queue that a call would join;
+  // --max-waiting-calls limits it. Requires: no call has arrived yet.
   void SetBacklog(std::function<size_t(Rpc)> backlog) { backlog_ = std::move(backlog); }
 
   // Properties of a call that determine its admission.
@@ -147,9 +147,9 @@ class Admission {
   // named limit is reached.
   absl::StatusOr<Ticket> Admit(const Arrival& arrival);
 
-  // Ends every call with a token that the guard no longer knows, with UNAUTHENTICATED. Returns the
-  // number of these calls. A call that does not end by itself within two seconds, for example
-  // because its client does not read, is cancelled without error details.
+  // Ends every call whose token the guard no longer knows, with UNAUTHENTICATED. Returns the number
+  // of such calls. A call that does not end by itself within two seconds, for example because its
+  // client does not read, is cancelled without error details.
   size_t EndRevoked();
 
   void BeginDrain();
@@ -196,7 +196,7 @@ class Admission {
   size_t calls_ = 0;
   // Connections with a health watch that counts toward no share.
   std::unordered_set<uint64_t> watching_health_;
-  // Only clients with running calls.
+  // Contains only clients with running calls.
   Ticket::Clients clients_;
   uint64_t last_client_ = 0;
   std::list<Ticket::Watched> watched_;

@@ -23,8 +23,7 @@
 
 namespace hulld::server {
 
-// Common part of all running calls, unary or streaming: a member of each reactor, with the same
-// lifetime.
+// State common to all running calls, unary and streaming. Each reactor has one as a member.
 //
 // Begin must be called first and End last, each exactly once. All functions may be called on any
 // thread.
@@ -50,11 +49,11 @@ class Call {
     HULLD_CHECK(ticket_.has_value());
     return ticket_->client();
   }
-  // True if the client had many running calls when this one arrived (Admission::kFewCalls).
+  // True if the client had many running calls when this one arrived (Admission::kBusyCalls).
   // Requires that Begin succeeded.
-  bool is_one_of_many() const {
+  bool is_client_busy() const {
     HULLD_CHECK(ticket_.has_value());
-    return ticket_->is_one_of_many();
+    return ticket_->is_client_busy();
   }
   // Arrival time of the call or, in a stream that calls BeginMessage, of the message being
   // processed.
@@ -75,9 +74,9 @@ class Call {
   void Cancel() { lifetime_.Cancel(); }
 
   // Authenticates and admits the call. After an error, the caller must end the call with it.
-  // on_revoked: as in Admission::Arrival. UNAUTHENTICATED, PERMISSION_DENIED: as
-  // Guard::Authenticate. UNAVAILABLE: the server is draining. RESOURCE_EXHAUSTED: a limit
-  // on calls is reached.
+  // on_revoked: as in Admission::Arrival. UNAUTHENTICATED, PERMISSION_DENIED: see
+  // Guard::Authenticate. UNAVAILABLE: the server is draining. RESOURCE_EXHAUSTED: a limit on calls
+  // is reached.
   absl::Status Begin(std::function<void()> on_revoked = {});
 
   // Count the work requested by the call.
@@ -91,13 +90,14 @@ class Call {
   // For streams with several messages in flight. arrival: the time at which the message arrived.
   void EndMessage(std::chrono::steady_clock::time_point arrival);
 
-  // Counts a limit that was reached without ending the call, for example by one pair of a batch.
+  // Counts, in the metrics, a limit that was reached without ending the call, for example by one
+  // pair of a batch.
   void CountLimit(const absl::Status& status) const;
 
   // Logs one line about this call, with its trace.
   void Log(LogLevel level, const std::string& message, LogFields fields = {}) const;
-  // Logs a change of a hull or a body with its author: the token's name and the peer. changed: as
-  // in {"hull", ID}.
+  // Logs a change of a hull or a body with its author: the token's name and the peer. changed: for
+  // example {"hull", ID}.
   void LogChange(const std::string& message, const LogField& changed, uint64_t revision,
                  const LogFields& fields = {}) const;
 

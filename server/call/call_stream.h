@@ -56,7 +56,8 @@ class CallStream : public Reactor, public std::enable_shared_from_this<CallStrea
 
   // Parses the request if it arrives with the call.
   virtual absl::Status Receive() { return absl::OkStatus(); }
-  // Starts the first step on a gRPC thread. Must neither block nor compute for long.
+  // Starts the work of the call. Runs on a gRPC thread, so it must neither block nor compute for
+  // long.
   virtual void Open() = 0;
   // Ends the call after its token was revoked, if it waits for an event that may never come. Steps
   // that compute or write notice the revocation themselves. Called on any thread, possibly twice,
@@ -109,12 +110,13 @@ class RequestStream : public Stream {
   // to the constructor of Stream.
   template <typename... Args>
   explicit RequestStream(const Bytes& bytes, Args&&... args)
-      : Stream(std::forward<Args>(args)...), bytes_(TakenFrom(bytes)) {}
+      : Stream(std::forward<Args>(args)...), bytes_(StealBytes(bytes)) {}
 
   // Requires that the call was admitted.
   const Request& request() const { return request_; }
-  // The request, for moving out a part of it. That part remains counted until the call ends.
-  Request& own_request() { return request_; }
+  // The request, from which the call may move parts. Their memory remains counted until the call
+  // ends.
+  Request& mutable_request() { return request_; }
 
  private:
   absl::Status Receive() final {
@@ -139,7 +141,7 @@ class ReadingStream : public Stream {
     if (!BeginRead()) OnNoMessage(absl::OkStatus());
   }
   bool reading() const { return reading_; }
-  // The message read last. Requires that no read is in flight.
+  // The last message read. Requires that no read is in flight.
   Request& request() {
     HULLD_DCHECK(!reading_);
     return request_;
@@ -164,7 +166,7 @@ class ReadingStream : public Stream {
     if (this->call().is_revoked()) return false;
     HULLD_CHECK(!std::exchange(reading_, true) && !this->finished());
     if (share_.bytes() > kKeptBytes) request_ = Request();
-    share_.GiveBack();
+    share_.Release();
     this->StartRead(&bytes_);
     return true;
   }
@@ -174,7 +176,7 @@ class ReadingStream : public Stream {
     return std::exchange(reading_, false);
   }
 
-  // A message that gRPC still reads is dropped.
+  // Drops a message that gRPC is still reading.
   void OnRevoked() final {
     Stream::OnRevoked();
     if (EndRead()) this->React([this] { OnNoMessage(absl::OkStatus()); });

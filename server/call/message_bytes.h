@@ -22,12 +22,12 @@ using BidiReactor = grpc::ServerBidiReactor<Bytes, Bytes>;
 
 // Parses a request of an admitted caller and frees its bytes. `share` then covers the message and
 // must live as long. INVALID_ARGUMENT: the bytes are not a message of this type.
-// RESOURCE_EXHAUSTED: as RequestMemory::Take, without parsing the message.
+// RESOURCE_EXHAUSTED: see RequestMemory::Take; the message is then not parsed.
 absl::Status ParseRequest(Bytes& bytes, RequestMemory& memory, google::protobuf::Message* message,
                           RequestMemory::Share& share);
 
-// Moves out the bytes of a request that gRPC passes as const but no longer needs.
-inline Bytes TakenFrom(const Bytes& bytes) {
+// Moves the bytes out of a request that gRPC passes as const but no longer needs.
+inline Bytes StealBytes(const Bytes& bytes) {
   Bytes taken;
   taken.Swap(const_cast<Bytes*>(&bytes));
   return taken;

@@ -89,20 +89,20 @@ MessageLayout::MessageLayout(const Descriptor& type) {
   }
 }
 
-uint64_t MessageLayout::ParsedBytes(std::string_view message, uint64_t most) const {
+uint64_t MessageLayout::ParsedBytes(std::string_view message, uint64_t limit) const {
   uint64_t bytes = own_bytes_;
   CodedInputStream input(reinterpret_cast<const uint8_t*>(message.data()),
                          static_cast<int>(message.size()));
-  Count(input, most, 0, bytes);
+  Count(input, limit, 0, bytes);
   return bytes;
 }
 
-void MessageLayout::Count(CodedInputStream& input, uint64_t most, int depth,
+void MessageLayout::Count(CodedInputStream& input, uint64_t limit, int depth,
                           uint64_t& bytes) const {
   static const Field kNone;
   // Fields within a group count as unknown; the contract has no groups.
   int groups = 0;
-  while (bytes <= most) {
+  while (bytes <= limit) {
     const uint32_t tag = input.ReadTag();
     if (tag == 0) return;
     const auto number = static_cast<size_t>(WireFormat::GetTagFieldNumber(tag));
@@ -117,7 +117,7 @@ void MessageLayout::Count(CodedInputStream& input, uint64_t most, int depth,
         if (--groups < 0) return;
         break;
       case WireFormat::WIRETYPE_LENGTH_DELIMITED:
-        if (!CountDelimited(input, field, most, depth, bytes)) return;
+        if (!CountDelimited(input, field, limit, depth, bytes)) return;
         break;
       default:
         if (!WireFormat::SkipField(&input, tag)) return;
@@ -131,7 +131,7 @@ void MessageLayout::Count(CodedInputStream& input, uint64_t most, int depth,
 }
 
 // Counts a length-delimited field. Returns false if it is malformed or nested too deeply.
-bool MessageLayout::CountDelimited(CodedInputStream& input, const Field& field, uint64_t most,
+bool MessageLayout::CountDelimited(CodedInputStream& input, const Field& field, uint64_t limit,
                                    int depth, uint64_t& bytes) {
   // Parsing allocates before it detects a malformed length.
   bytes += field.message != nullptr ? field.message->own_bytes_ : kAllocation;
@@ -142,7 +142,7 @@ bool MessageLayout::CountDelimited(CodedInputStream& input, const Field& field, 
   if (field.message != nullptr) {
     if (depth >= kMaxDepth) return false;
     const CodedInputStream::Limit outer = input.PushLimit(length);
-    field.message->Count(input, most, depth + 1, bytes);
+    field.message->Count(input, limit, depth + 1, bytes);
     const bool is_read = input.BytesUntilLimit() == 0;
     input.PopLimit(outer);
     return is_whole && is_read;

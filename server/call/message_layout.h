@@ -19,18 +19,18 @@ class MessageLayout {
   static const MessageLayout& Of(const google::protobuf::Descriptor& type);
 
   // Returns an upper bound on the memory, in bytes, of a message after parsing. Stops counting
-  // above `most`. Includes unknown fields, which parsing keeps. Counts a malformed message up to
+  // above `limit`. Includes unknown fields, which parsing keeps. Counts a malformed message up to
   // the point where parsing fails. Cost: O(fields), a few ns each; packed numbers at memory speed.
-  uint64_t ParsedBytes(std::string_view message, uint64_t most) const;
+  uint64_t ParsedBytes(std::string_view message, uint64_t limit) const;
 
  private:
-  // A number, a text, or a message; otherwise unknown.
+  // A number, a string, or a message. Any other field counts as unknown.
   struct Field {
     bool is_number() const { return element_bytes > 0; }
 
     bool is_repeated = false;
     bool is_text = false;
-    // As the contract declares it; lists of numbers are packed or not.
+    // Wire type of a single value. Lists of numbers may be packed or not.
     uint8_t wire_type = 0;
     // Bytes of a number in memory.
     uint32_t element_bytes = 0;
@@ -39,10 +39,10 @@ class MessageLayout {
 
   explicit MessageLayout(const google::protobuf::Descriptor& type);
 
-  void Count(google::protobuf::io::CodedInputStream& input, uint64_t most, int depth,
+  void Count(google::protobuf::io::CodedInputStream& input, uint64_t limit, int depth,
              uint64_t& bytes) const;
   static bool CountDelimited(google::protobuf::io::CodedInputStream& input, const Field& field,
-                             uint64_t most, int depth, uint64_t& bytes);
+                             uint64_t limit, int depth, uint64_t& bytes);
 
   // Indexed by field number; gaps are unknown fields.
   std::vector<Field> fields_;

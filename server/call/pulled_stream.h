@@ -13,7 +13,7 @@ namespace hulld::server {
 // A stream with pulled replies: each is created after the previous one was written, so a slow
 // client costs the memory of a single message. Only one operation is in flight at a time: a read, a
 // task, or a write. Only this operation accesses the state, so no mutex is needed. A revocation
-// replaces a read in flight.
+// ends a read in flight.
 template <typename Reactor, typename Reply>
 class PulledStream : public CallStream<Reactor> {
  protected:

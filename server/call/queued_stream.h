@@ -15,12 +15,13 @@
 
 namespace hulld::server {
 
-// A stream with queued replies. Any thread adds replies, and they are written one at a time in
-// queue order. One mutex guards the state. Reads, writes, and the end are started under it; gRPC
-// calls back without it.
+// A stream that queues its replies. Any thread may add replies; they are written one at a time, in
+// order. One mutex guards the state. It is held when a read, a write, or the end of the call is
+// started, but not during gRPC's callbacks.
 //
-// The stream ends after an end is set, the earlier replies are written, and no work is in flight.
-// If the client disconnects or is revoked, the stream ends without sending the queued replies.
+// The stream ends once its final status is set, all earlier replies are written, and no work is in
+// flight. If the client disconnects or is revoked, the stream ends without sending the queued
+// replies.
 template <typename Reactor, typename Reply>
 class QueuedStream : public CallStream<Reactor> {
  protected:
@@ -49,14 +50,14 @@ class QueuedStream : public CallStream<Reactor> {
 
   // The functions below require the mutex: call them in steps of Locked.
 
-  // Starts work (reads or tasks) as the state permits. Called after each Locked step until an end
-  // is set. May queue replies and set the end.
+  // Starts work (reads or tasks) as the state permits. Called after each Locked step until the
+  // final status is set. May queue replies and set the final status.
   virtual void StartWork() {}
   // Returns true if work is in flight that must finish before the stream ends.
   virtual bool IsWorking() const { return false; }
   // Returns true if the only queued reply must wait to be merged with later ones, which saves
   // writes. In that case, a Locked step must follow soon.
-  virtual bool KeepsWaiting() { return false; }
+  virtual bool ShouldDelayWrite() { return false; }
 
   // Queues a reply. bytes: its size, if the stream bounds its queue.
   void Queue(Reply reply, size_t bytes = 0) {
@@ -79,11 +80,11 @@ class QueuedStream : public CallStream<Reactor> {
   // Total size of the queued replies and of the one being written.
   size_t unsent_bytes() const { return unsent_bytes_; }
 
-  // Sets the end unless one is set.
+  // Sets the final status unless it is set already.
   void End(const absl::Status& status) {
     if (!end_.has_value()) end_ = status;
   }
-  // Replaces the end with a more specific one.
+  // Replaces the final status with a more specific one.
   void OverrideEnd(const absl::Status& status) { end_ = status; }
   const std::optional<absl::Status>& end() const { return end_; }
 
@@ -113,7 +114,7 @@ class QueuedStream : public CallStream<Reactor> {
     if (this->finished()) return;
     if (!end_.has_value()) StartWork();
     const bool is_alone = waiting_.size() == 1 && !end_.has_value();
-    if (!writing_ && !waiting_.empty() && !(is_alone && KeepsWaiting())) {
+    if (!writing_ && !waiting_.empty() && !(is_alone && ShouldDelayWrite())) {
       writing_ = true;
       bytes_ = SerializeReply(waiting_.front().reply);
       bytes_in_flight_ = waiting_.front().bytes;

@@ -16,7 +16,7 @@ constexpr std::chrono::milliseconds kRetry(1000);
 }  // namespace
 
 absl::Status RequestMemory::Take(uint64_t bytes, Share& share) {
-  share.GiveBack();
+  share.Release();
   if (bytes > limit_bytes_) {
     return LimitExceeded(absl::StrCat("the message would take more than ", limit_bytes_,
                                       " bytes of memory; split it into smaller messages"),

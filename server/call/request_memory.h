@@ -25,9 +25,9 @@ class RequestMemory {
       std::swap(bytes_, other.bytes_);
       return *this;
     }
-    ~Share() { GiveBack(); }
+    ~Share() { Release(); }
 
-    void GiveBack() {
+    void Release() {
       if (memory_ != nullptr) memory_->taken_.fetch_sub(bytes_, std::memory_order_relaxed);
       memory_ = nullptr;
       bytes_ = 0;

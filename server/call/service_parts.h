@@ -16,7 +16,8 @@ struct ServiceParts {
   Admission& admission;
   // Builds chunks and replacements.
   TaskPool& writers;
-  // For steps that may block: for the records and hulls of one pair, and for many or large hulls.
+  // Run steps that may block: `readers` those for the records and hulls of one pair, `long_readers`
+  // those for many or large hulls.
   TaskPool& readers;
   TaskPool& long_readers;
   // Computes answers.

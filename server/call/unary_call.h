@@ -26,7 +26,7 @@ class UnaryCall : public UnaryReactor {
     auto* call = new UnaryCall(*context, admission, rpc, response);
     absl::Status begun = call->call_.Begin();
     if (begun.ok()) {
-      Bytes bytes = TakenFrom(*request);
+      Bytes bytes = StealBytes(*request);
       begun = ParseRequest(bytes, admission.request_memory(), &call->request_, call->share_);
     }
     if (begun.ok()) {

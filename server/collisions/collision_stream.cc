@@ -145,7 +145,7 @@ class CollisionStream
     return OfMessage(HandleUpdate(request().update()));
   }
 
-  // Returns the client's status for this result of an update.
+  // Returns the status with the number of the current update before its message.
   absl::Status OfMessage(const absl::Status& status) const {
     if (messages_ == 0) return status;
     return Prefixed(absl::StrCat("update ", messages_, ": "), status);
@@ -158,7 +158,7 @@ class CollisionStream
                                             parts_.registry.limits(), call().lifetime()));
     HULLD_ASSIGN_OR_RETURN(
         freshness_, DecodeFreshness(open.freshness(), parts_.store, call().message_arrival()));
-    HULLD_RETURN_IF_ERROR(RefuseMotions(open.placements(), open.packed_placements(), "a stream"));
+    HULLD_RETURN_IF_ERROR(CheckNoMotions(open.placements(), open.packed_placements(), "a stream"));
     HULLD_ASSIGN_OR_RETURN(
         table_,
         PlacementTable::Make(open.placements(), *open.mutable_packed_placements(), call().caller(),
@@ -268,19 +268,19 @@ class CollisionStream
   }
 
   // Works on blocks until none is left, or until other calls are due. Runs on any thread, and on
-  // several concurrently. The thread that returns the last block continues. A thread must not
-  // access this stream after it returned the last block, or if it found no block.
+  // several concurrently. The thread that completes the last block continues. No other thread may
+  // access this stream after it completed its last block, or if it found none.
   void DecideBlocks() {
     const auto end = std::chrono::steady_clock::now() + TaskPool::kSliceTime;
     while (true) {
       const ClaimedRange::Block block = unclaimed_.Claim(kPairsPerClaim);
       if (block.empty()) return;
-      // If the call must stop, blocks are returned undone, so that exactly one thread is still the
-      // last.
+      // If the call must stop, blocks are completed without any work, so that exactly one thread is
+      // still the last.
       if (!call().ShouldStop()) {
         for (uint32_t i = block.begin; i < block.end; ++i) Decide(i);
       }
-      if (unclaimed_.GiveBack(block)) return AnswerSlice();
+      if (unclaimed_.Complete(block)) return AnswerSlice();
       if (std::chrono::steady_clock::now() >= end) return RunOn(lane_, [this] { DecideBlocks(); });
     }
   }

@@ -139,7 +139,7 @@ class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchC
     const Limits& limits = parts_.registry.limits();
     HULLD_ASSIGN_OR_RETURN(
         options_, MakeQueryOptions(v1::METHOD_UNSPECIFIED, wanted, 0, limits, call().lifetime()));
-    HULLD_RETURN_IF_ERROR(RefuseMotions(open.placements(), open.packed_placements(), "a watch"));
+    HULLD_RETURN_IF_ERROR(CheckNoMotions(open.placements(), open.packed_placements(), "a watch"));
     HULLD_ASSIGN_OR_RETURN(
         table_, PlacementTable::Make(open.placements(), *open.mutable_packed_placements(),
                                      call().caller(), limits.max_placements, "the watch"));

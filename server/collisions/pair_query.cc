@@ -139,7 +139,7 @@ class PairQuery : public std::enable_shared_from_this<PairQuery> {
     // calls in the order of arrival.
     const bool is_quick = WantsRelationsOfHulls(options_, table_) &&
                           IsQuickToRelate(table_.HullAt(kA)) &&
-                          IsQuickToRelate(table_.HullAt(kB)) && !call_->call().is_one_of_many();
+                          IsQuickToRelate(table_.HullAt(kB)) && !call_->call().is_client_busy();
     if (is_quick) return RunSlice();
     parts_.pool.Submit([self = shared_from_this()] { self->RunSlice(); }, call_->call().client());
   }

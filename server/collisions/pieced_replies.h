@@ -134,9 +134,9 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     HULLD_ASSIGN_OR_RETURN(
         freshness_, DecodeFreshness(request.freshness(), parts_.store, this->call().arrival()));
     HULLD_ASSIGN_OR_RETURN(
-        table_,
-        PlacementTable::Make(request.placements(), *this->own_request().mutable_packed_placements(),
-                             this->call().caller(), registry().limits().max_placements, what));
+        table_, PlacementTable::Make(
+                    request.placements(), *this->mutable_request().mutable_packed_placements(),
+                    this->call().caller(), registry().limits().max_placements, what));
     if (!table_.has_motions()) return absl::OkStatus();
     HULLD_RETURN_IF_ERROR(ValidateForMotions(query_));
     motion_options_ = MakeMotionOptions(request.wanted(), query_);
@@ -177,8 +177,8 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     piece.replies.clear();
     piece.bytes = 0;
   }
-  // Called after all pieces are delivered. Returns the number of further units, which exist only
-  // from then on; 0 if there are none.
+  // Called after all pieces are delivered. Returns the number of additional units that become known
+  // only then, or 0.
   virtual uint64_t CountFollowingUnits() { return 0; }
   // Called when no units are left, to queue a final message; the end is set afterwards.
   virtual void OnAllDelivered() {}
@@ -303,7 +303,7 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   bool IsWorking() const final { return opening_ || running_ > 0; }
 
   // The end of the preparation and of each slice is a Locked step.
-  bool KeepsWaiting() final {
+  bool ShouldDelayWrite() final {
     if (holds_head_) return opening_ || running_ > 0;
     return running_ > 0 && this->LastWaiting()->bytes <= kSmallReplyBytes &&
            Clock::now() - this->LastWaiting()->since < kMaxWait;

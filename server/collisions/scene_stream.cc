@@ -310,7 +310,7 @@ class SceneStream
     } else if (table_.has_motions()) {
       found = QueryPlaced(table_, a, b, query_, motion_options_);
     } else {
-      found.answer = search_->Ask(a, b, &found.of_body);
+      found.answer = search_->Query(a, b, &found.of_body);
       if (!found.answer.ok()) found.answer = NameLimit(found.answer.status(), query_);
     }
     if (absl::IsCancelled(found.answer.status())) return found.answer.status();

@@ -52,7 +52,7 @@ class WatchedHulls {
 
   // Watches these hulls and bodies and resolves all of them. IDs may repeat. on_ready: as in
   // ChangeFeed::Open; may be called before this returns. Requires that it was not called before.
-  // Errors: as ChangeFeed::Open, RecordReader::FindBodies and ResolvePlaced.
+  // Errors: see ChangeFeed::Open, RecordReader::FindBodies, and ResolvePlaced.
   absl::StatusOr<Round> Open(std::span<const std::string> ids, std::function<void()> on_ready,
                              const PlacedLookup& lookup, const std::function<bool()>& should_stop);
   // Resolves the hulls and bodies that changed. Requires that the watch does not wait.

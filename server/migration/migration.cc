@@ -170,7 +170,7 @@ absl::StatusOr<std::vector<Change>> Migration::ChangesOf(const StoredHull& hull)
     Change committed;
     committed.hull = changes.front().hull;
     committed.revision = hull.record.revision;
-    committed.former_vertices = hull.record.vertex_count;
+    committed.previous_vertices = hull.record.vertex_count;
     committed.writer = std::move(writer);
     changes.push_back(std::move(committed));
   }

@@ -44,7 +44,7 @@ class MigrationTarget {
   virtual absl::Status Finish(const MigrationSource& source) = 0;
 };
 
-// INVALID_ARGUMENT, FAILED_PRECONDITION, UNAVAILABLE: as RocksDbStore::Open.
+// INVALID_ARGUMENT, FAILED_PRECONDITION, UNAVAILABLE: see RocksDbStore::Open.
 absl::StatusOr<std::unique_ptr<MigrationTarget>> OpenRocksDbTarget(const std::string& data_dir);
 // Like PostgresStore::Open; CANCELLED: a server is active on the database.
 absl::StatusOr<std::unique_ptr<MigrationTarget>> OpenPostgresTarget(const std::string& conninfo);

@@ -112,11 +112,12 @@ ConnectionAcceptor::ConnectionAcceptor(const ListenAddress& address, ConnectionT
       closed_idle_(metrics.AddCounter("hulld_connections_closed_total",
                                       "Connections closed by the server, by reason.",
                                       {{"reason", "idle"}})) {
-  const uint64_t most = MaxDescriptors();
-  const uint64_t reserved = std::min(kReservedDescriptors, most / 4);
-  first_reserved_ = static_cast<int>(std::min<uint64_t>(most - reserved, kMaxGuardedDescriptors));
+  const uint64_t max_descriptors = MaxDescriptors();
+  const uint64_t reserved = std::min(kReservedDescriptors, max_descriptors / 4);
+  first_reserved_ =
+      static_cast<int>(std::min<uint64_t>(max_descriptors - reserved, kMaxGuardedDescriptors));
   max_closing_ = std::max<int64_t>(1, static_cast<int64_t>(reserved / 2));
-  table_.LimitTo(static_cast<size_t>(std::max(1, first_reserved_)));
+  table_.LowerLimit(static_cast<size_t>(std::max(1, first_reserved_)));
 }
 
 absl::Status ConnectionAcceptor::BindUnix() {

@@ -14,7 +14,7 @@ ConnectionTable::Outcome ConnectionTable::Add(uint64_t id, const std::optional<P
       if (outcome.evicted == 0) return {.refusal = Refusal::kNetwork};
     }
   }
-  if (connections_.size() >= most_) {
+  if (connections_.size() >= max_connections_) {
     outcome.evicted = EvictFirst(idle_);
     if (outcome.evicted == 0) return {.refusal = Refusal::kTotal};
   }

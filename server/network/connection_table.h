@@ -21,8 +21,8 @@ namespace hulld::server {
 // Thread-safe.
 class ConnectionTable {
  public:
-  ConnectionTable(size_t most, size_t max_per_network)
-      : most_(most), max_per_network_(max_per_network) {}
+  ConnectionTable(size_t max_connections, size_t max_per_network)
+      : max_connections_(max_connections), max_per_network_(max_per_network) {}
 
   enum class Refusal { kNone, kTotal, kNetwork };
   struct Outcome {
@@ -45,9 +45,11 @@ class ConnectionTable {
 
   size_t size() const;
   // Limit on all connections.
-  size_t most() const { return most_; }
+  size_t max_connections() const { return max_connections_; }
   // Lowers the limit, for a process with fewer descriptors. Call before the first connection.
-  void LimitTo(size_t most) { most_ = std::min(most_, most); }
+  void LowerLimit(size_t max_connections) {
+    max_connections_ = std::min(max_connections_, max_connections);
+  }
 
  private:
   // Idle connections, the one that has been idle longest first.
@@ -73,7 +75,7 @@ class ConnectionTable {
   uint64_t EvictFirst(const IdleList& idle);
   void Erase(Connections::iterator connection);
 
-  size_t most_;
+  size_t max_connections_;
   const size_t max_per_network_;
   mutable std::mutex mutex_;
   Connections connections_;

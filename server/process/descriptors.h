@@ -6,7 +6,7 @@
 
 namespace hulld::server {
 
-// A descriptor that closes itself.
+// Owns a file descriptor and closes it on destruction.
 class Descriptor {
  public:
   explicit Descriptor(int number = -1) : number_(number) {}
@@ -18,7 +18,7 @@ class Descriptor {
   ~Descriptor();
 
   int number() const { return number_; }
-  // Releases the ownership.
+  // Gives up ownership.
   int Release() { return std::exchange(number_, -1); }
 
  private:

@@ -20,7 +20,7 @@ absl::StatusOr<ListenAddress> ParseMetricsAddress(const std::string& address, bo
 class MetricsEndpoint {
  public:
   // address: "host:port" or "[v6]:port"; port 0 picks a free one. exposed: true if other machines
-  // may reach it. The metrics must outlive this. INVALID_ARGUMENT: as ParseMetricsAddress.
+  // may reach it. The metrics must outlive this. INVALID_ARGUMENT: see ParseMetricsAddress.
   // UNAVAILABLE: it cannot be bound.
   static absl::StatusOr<std::unique_ptr<MetricsEndpoint>> Start(const std::string& address,
                                                                 bool exposed,

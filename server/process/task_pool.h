@@ -35,15 +35,15 @@ class TaskPool {
   // Duration of a slice: about the time that the answer of a single call takes over the wire, and a
   // hundred times the cost of a task switch (**observed**: 2 us). Not tuned.
   static constexpr std::chrono::microseconds kSliceTime{250};
-  // While single calls arrive, and for this long afterwards, slices leave one thread's core to
-  // them: the system runs a computing thread for a few milliseconds (a tick of Linux is 1 to 10 ms)
-  // before it schedules gRPC's threads, which bring the calls.
+  // While single calls arrive, and for this long afterwards, slices leave one core free for them.
+  // Otherwise, the kernel would let a computing thread run for a few milliseconds (a tick of Linux
+  // is 1 to 10 ms) before it schedules the gRPC threads that deliver the calls.
   static constexpr std::chrono::milliseconds kReserveTime{20};
-  // During that time, a thread pauses for this long after each slice, so that the system gives its
-  // core to waiting threads of gRPC, and of clients on this machine. Otherwise, the system would
-  // run this thread until the next tick. **Observed** on two cores: the p99 of single calls during
-  // batches is 2.2 to 3.0 times that of an idle server, without pauses 7 to 9 times; batches then
-  // answer a third to a half fewer pairs (tests/bench/results/server_overload_*.csv).
+  // During that time, a thread pauses for this long after each slice, so that the kernel gives its
+  // core to waiting threads of gRPC and of clients on this machine. Otherwise, this thread would
+  // keep the core until the next tick. **Observed** on two cores: during batches, the p99 of single
+  // calls is 2.2 to 3.0 times that of an idle server, or 7 to 9 times without pauses. Pauses reduce
+  // the throughput of batches by a third to a half (tests/bench/results/server_overload_*.csv).
   static constexpr std::chrono::microseconds kPauseTime{80};
 
   // Slices of a long call. Requires at destruction: no slice is queued; each slice should therefore

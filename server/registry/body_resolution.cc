@@ -36,7 +36,7 @@ absl::Status WhyNoPiece(const Body& body, size_t hull, const absl::Status& cause
   }
   return WithReason(absl::NotFoundError(
                         absl::StrCat(QuotedBody(body_id), ": piece ", piece, ": ", cause.message(),
-                                     "; create it, or put the body without that piece")),
+                                     "; create it, or remove that piece from the body")),
                     v1::ERROR_REASON_PIECE_NOT_FOUND,
                     {{"body_id", body_id}, {"piece", uint64_t{piece}}, {"hull_id", hull_id}});
 }
@@ -101,8 +101,8 @@ ReadPlan PlanOf(const PlacedLookup& lookup) {
 }
 
 // Returns the bodies among the IDs; empty if there are none. Omits IDs that cannot be read now: the
-// subsequent hull lookup reports their errors. Otherwise as RecordReader::FindBodies. WouldWait
-// also if there are bodies, whose boxes must be built.
+// subsequent hull lookup reports their errors. Other errors: see RecordReader::FindBodies.
+// WouldWait also if there are bodies, whose boxes must be built.
 absl::StatusOr<Bodies> BodiesAmong(Registry& registry, std::span<const std::string> ids,
                                    const std::function<bool()>& should_stop, bool may_wait) {
   if (!registry.has_bodies()) return Bodies();

@@ -91,12 +91,12 @@ class KnownPlaced {
 };
 
 // Resolves hulls and bodies by ID, all at one revision of the store, and builds the hulls of inline
-// shapes. If a body has no hull for some piece, its result is an error: NOT_FOUND
-// (PIECE_NOT_FOUND), PERMISSION_DENIED, or DATA_LOSS, which names body and piece;
-// RESOURCE_EXHAUSTED: --memory-limit has no room for its pieces. Without bodies, equivalent to
-// HullReader::Refresh. Builds boxes of pieces, so it must not run on a gRPC thread unless
-// plan.may_wait is false: WouldWait then includes bodies and inline shapes. CANCELLED: should_stop
-// returned true.
+// shapes. If the hull of a piece is missing, outside the prefix, or damaged, the result of its body
+// is NOT_FOUND (PIECE_NOT_FOUND), PERMISSION_DENIED, or DATA_LOSS, and names the body and the
+// piece. If --memory-limit has no room for the pieces, it is RESOURCE_EXHAUSTED. Without bodies,
+// equivalent to HullReader::Refresh. Builds boxes of pieces, so it must not run on a gRPC thread
+// unless plan.may_wait is false, in which case it returns WouldWait if there are bodies or unbuilt
+// inline shapes. CANCELLED: should_stop returned true.
 absl::StatusOr<Resolved> ResolvePlaced(Registry& registry, std::span<const std::string> ids,
                                        const PlacedLookup& lookup,
                                        const std::function<bool()>& should_stop);

@@ -36,7 +36,7 @@ namespace hulld::server {
 //   Committer      commits changes to the store in batches, in the order of submission
 //   PeerSync       applies the commits of peer servers, if there are any; blocks a call until the
 //                  registry satisfies its freshness
-//   RecordReader   finds bodies; loads and lists records if the store finds records
+//   RecordReader   finds bodies; loads and lists records if the store supports record lookup
 //   LocalChanges   creates, deletes, replaces, and grows hulls and bodies
 //   HullReader     serves hulls of a single snapshot
 //   ChangeFeed     sends the initial state and then every change to watches
@@ -51,9 +51,9 @@ namespace hulld::server {
 //
 // Readers and writers never wait for each other. A writer appends to a LiveHull without holding the
 // mutex; a mark records the committed prefix, and readers get the version at the mark. Evicted data
-// is read back from the store at first use. If the store finds records, a starting server does not
-// load them: a call that depends on an ID loads its record first, and looks the ID up again after
-// each wait.
+// is read back from the store when it is next used. If the store supports record lookup, a starting
+// server loads no records: a call that depends on an ID loads its record first, and looks the ID up
+// again after each wait.
 //
 // One mutex (RegistryState::mutex) guards the state of all parts and is held only briefly
 // (kMaxLookupsPerHold). Passing a Locked proves that it is held.
@@ -75,15 +75,15 @@ class Registry {
   Registry& operator=(const Registry&) = delete;
   ~Registry();
 
-  // Loads the records of all hulls and bodies, unless the store finds records. Must precede all
-  // other calls. Damaged records are logged; later calls on them return DATA_LOSS.
+  // Loads the records of all hulls and bodies, unless the store supports record lookup. Must
+  // precede all other calls. Damaged records are logged; later calls on them return DATA_LOSS.
   absl::Status Load();
-  // Sets the maximum number of unused hull records, and of small body records, kept in memory if
-  // the store finds records. Replaces the default derived from --memory-limit. Call before Load;
-  // for tests.
-  void KeepRecords(size_t most) {
-    state_.hulls.KeepAtMost(most);
-    state_.bodies.KeepAtMost(most * 2 * BodyTable::kBytesOfEntry);
+  // Sets the number of unused hull records, and of small body records, that are kept in memory if
+  // the store supports record lookup, instead of the default derived from --memory-limit. Call
+  // before Load; for tests.
+  void SetRecordCapacity(size_t capacity) {
+    state_.hulls.SetCapacity(capacity);
+    state_.bodies.SetCapacity(capacity * 2 * BodyTable::kBytesOfEntry);
   }
 
   const Store& store() const { return state_.store; }
@@ -110,7 +110,7 @@ class Registry {
   void RestIdleHulls();
 
   RegistrySizes Sizes() const;
-  // Hold times and work per hold of the registry's mutex.
+  // Times for which the registry's mutex was held, and the work done meanwhile.
   HoldStatistics Holds() const;
   CacheStatistics Cache() const;
   CommitStatistics Commits() const { return committer_.Statistics(); }
@@ -124,10 +124,10 @@ class Registry {
 
   // Returns the hulls, ready to be served, all at one revision of the store that satisfies the
   // plan's freshness. May read the store and prepare hulls, so it must not run on a gRPC thread.
-  // CANCELLED: should_stop returned true. FAILED_PRECONDITION, UNAVAILABLE: as AwaitFresh.
-  // RESOURCE_EXHAUSTED: hulls must be read from the store, or there are more than
-  // kMaxLookupsPerHold, while readers exceed their share of --memory-limit; without a retry delay
-  // if these hulls account for most of it. WouldWait: see ReadPlan::may_wait.
+  // CANCELLED: should_stop returned true. FAILED_PRECONDITION, UNAVAILABLE: see
+  // PeerSync::AwaitFresh. RESOURCE_EXHAUSTED: hulls must be read from the store, or there are more
+  // than kMaxLookupsPerHold, while readers exceed their share of --memory-limit; without a retry
+  // delay if these hulls account for most of it. WouldWait: see ReadPlan::may_wait.
   absl::StatusOr<Resolved> Resolve(std::span<const std::string> ids,
                                    const std::function<bool()>& should_stop,
                                    const ReadPlan& plan = {});

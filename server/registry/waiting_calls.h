@@ -52,8 +52,8 @@ class WaitingCalls {
   std::shared_ptr<Wait> Add(std::function<bool()> should_stop,
                             std::function<void(const absl::Status&)> done);
 
-  // Calls `done` as above when the registry satisfies `freshness`. Returns false and does nothing
-  // if it already does. Cost: as PeerSync::StartFetch.
+  // Like Add, but calls `done` once the registry satisfies `freshness`. Returns false and does
+  // nothing if it already does. Cost: see PeerSync::StartFetch.
   bool AwaitFresh(Registry& registry, const Freshness& freshness, std::function<bool()> should_stop,
                   std::function<void(const absl::Status&)> done);
 

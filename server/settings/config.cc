@@ -57,11 +57,11 @@ size_t EditDistance(const std::string& a, const std::string& b) {
 // Returns the known word nearest to a misspelled one; empty if none is near.
 std::string Nearest(const std::string& word, const std::vector<std::string>& known) {
   std::string nearest;
-  size_t least = std::max<size_t>(1, word.size() / 3) + 1;
+  size_t min = std::max<size_t>(1, word.size() / 3) + 1;
   for (const std::string& candidate : known) {
     const size_t distance = EditDistance(word, candidate);
-    if (distance >= least) continue;
-    least = distance;
+    if (distance >= min) continue;
+    min = distance;
     nearest = candidate;
   }
   return nearest;
@@ -432,26 +432,26 @@ class Parser {
 
   // CLI::Range alone would take -1 for the largest number.
   void AddLimit(const std::string& name, uint64_t& value, const std::string& description,
-                uint64_t most = kAnyNumber) {
-    const auto check = [most](const std::string& text) -> std::string {
+                uint64_t max = kAnyNumber) {
+    const auto check = [max](const std::string& text) -> std::string {
       uint64_t number = 0;
-      if (absl::SimpleAtoi(text, &number) && number >= 1 && number <= most) return "";
-      return absl::StrCat("\"", text, "\" is not a whole number from 1 to ", most);
+      if (absl::SimpleAtoi(text, &number) && number >= 1 && number <= max) return "";
+      return absl::StrCat("\"", text, "\" is not a whole number from 1 to ", max);
     };
     Add(name, value, description)->check(CLI::Validator(check, ""))->type_name("N");
   }
 
   // Adds a size in bytes. A default of 0 is also accepted as a value.
   void AddSize(const std::string& name, uint64_t& value, const std::string& description,
-               uint64_t most, uint64_t least) {
+               uint64_t max, uint64_t min) {
     const bool takes_zero = value == 0;
     const auto read = [=](std::string& text) -> std::string {
       const std::optional<uint64_t> size = ParseSize(text);
-      if (size.has_value() && ((*size >= least && *size <= most) || (takes_zero && *size == 0))) {
+      if (size.has_value() && ((*size >= min && *size <= max) || (takes_zero && *size == 0))) {
         text = absl::StrCat(*size);
         return "";
       }
-      return absl::StrCat("\"", text, "\" is not a size from ", least, " to ", most, " bytes",
+      return absl::StrCat("\"", text, "\" is not a size from ", min, " to ", max, " bytes",
                           takes_zero ? ", or 0" : "",
                           "; give a number of bytes, or a unit: kB, MB, GB, KiB, MiB, GiB");
     };

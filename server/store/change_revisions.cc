@@ -23,7 +23,7 @@ void NumberHull(Change& change, Grown& grown) {
   if (!change.begins) {
     HULLD_CHECK(change.before != nullptr);
     now = grown.try_emplace(change.before.get(), *change.before).first->second;
-    change.former_layout.base_revision = now.base;
+    change.previous_layout.base_revision = now.base;
     if (change.takes_revision) now.change = change.revision;
   }
   if (change.vertex_change == VertexChange::kReplaced) now.base = change.revision;

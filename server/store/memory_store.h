@@ -10,7 +10,8 @@
 
 namespace hulld::server {
 
-// A store without storage: the registry keeps everything in memory. Each start is a new store.
+// A store that stores nothing: the registry keeps everything in memory. Each start creates a new
+// store.
 class MemoryStore : public Store {
  public:
   std::string kind() const override { return "memory"; }

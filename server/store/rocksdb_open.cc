@@ -60,7 +60,7 @@ absl::StatusOr<std::unique_ptr<RocksDbStore>> RocksDbStore::Open(RocksDbOptions 
   std::unique_ptr<RocksDbStore> store(new RocksDbStore(std::move(options)));
   const bool read_only = store->options_.read_only;
   HULLD_RETURN_IF_ERROR(read_only ? store->Lock() : store->MakeDirectories());
-  HULLD_RETURN_IF_ERROR(store->OpenDbInRoom());
+  HULLD_RETURN_IF_ERROR(store->OpenDbWithReserve());
   HULLD_RETURN_IF_ERROR(store->ReadMeta());
   if (read_only) return store;
   ClearScratch(store->options_.data_dir);
@@ -180,7 +180,7 @@ rocksdb::Status RocksDbStore::OpenForReading() {
   return status;
 }
 
-absl::Status RocksDbStore::OpenDbInRoom() {
+absl::Status RocksDbStore::OpenDbWithReserve() {
   absl::Status opened = OpenDb();
   if (options_.read_only) return opened;
   if (IsDiskFull(opened) && reserve_.Release()) opened = OpenDb();
@@ -316,7 +316,7 @@ absl::Status RocksDbStore::BeginRun() {
   // A damaged mark counts as a mark.
   const bool cut_short = !run.ok() || run->has_value();
   const bool relaxed = options_.durability == Durability::kRelaxed;
-  const std::string former_id = id_;
+  const std::string previous_id = id_;
   rocksdb::WriteBatch batch;
   if (options_.accept_loss || restored || cut_short) {
     id_ = RandomId();
@@ -335,12 +335,12 @@ absl::Status RocksDbStore::BeginRun() {
   }
   if (restored) {
     spdlog::info("restored from a backup of store {} at revision {}; the new store ID is {}",
-                 former_id, revision_, id_);
+                 previous_id, revision_, id_);
   } else if (cut_short) {
     spdlog::warn(
         "store {} was open with --durability=relaxed and not shut down cleanly; its last "
         "acknowledged changes may be lost; continuing at revision {} as store {}",
-        former_id, revision_, id_);
+        previous_id, revision_, id_);
   }
   return absl::OkStatus();
 }

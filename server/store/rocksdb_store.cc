@@ -37,11 +37,11 @@ void DropIncarnation(rocksdb::WriteBatch& batch, const StoredHull& hull,
 void PutBase(rocksdb::WriteBatch& batch, const Change& change) {
   const HullRecord& record = change.hull.record;
   const uint64_t incarnation = record.create_revision;
-  if (change.former_layout.base_revision != 0) {
+  if (change.previous_layout.base_revision != 0) {
     batch.DeleteRange(IncarnationKey(kBasePrefix, incarnation),
                       BaseKey(incarnation, record.revision, 0));
   }
-  if (change.former_layout.delta_count > 0) {
+  if (change.previous_layout.delta_count > 0) {
     batch.DeleteRange(IncarnationKey(kDeltaPrefix, incarnation),
                       DeltaKey(incarnation, record.revision));
   }
@@ -55,7 +55,7 @@ void PutBase(rocksdb::WriteBatch& batch, const Change& change) {
 
 // Returns true if the change deletes or replaces a hull with a damaged record. EncodeChange does
 // not find the other values of such a hull.
-bool EndsUnknown(const Change& change) {
+bool EndsDamagedHull(const Change& change) {
   if (change.body != nullptr) return false;
   if (change.deleted) return change.hull.record.create_revision == 0;
   return change.replaced.has_value() && change.replaced->record.create_revision == 0;
@@ -77,7 +77,7 @@ void EncodeChange(rocksdb::WriteBatch& batch, const Change& change) {
   }
   if (change.deleted) {
     batch.Delete(hull_key);
-    DropIncarnation(batch, change.hull, change.former_layout);
+    DropIncarnation(batch, change.hull, change.previous_layout);
     return;
   }
   PutSealed(batch, hull_key, EncodeStoredHull(change.hull));
@@ -156,7 +156,7 @@ absl::Status RocksDbStore::Commit(std::span<Change* const> changes) {
   rocksdb::WriteBatch batch;
   for (const Change* change : changes) {
     EncodeChange(batch, *change);
-    if (EndsUnknown(*change)) PutSealed(batch, kLostKey, "");
+    if (EndsDamagedHull(*change)) PutSealed(batch, kLostKey, "");
   }
   PutSealed(batch, kRevisionKey, EncodeNumber(revision));
   rocksdb::WriteOptions options;
@@ -249,7 +249,7 @@ std::optional<StoreDisk> RocksDbStore::disk() const {
   db_->GetIntProperty(rocksdb::DB::Properties::kIsWriteStopped, &is_stopped);
   db_->GetIntProperty(rocksdb::DB::Properties::kActualDelayedWriteRate, &delayed_rate);
   disk.is_stalled = is_stopped != 0 || delayed_rate != 0;
-  disk.stalls = former_stalls_ + CountStalls();
+  disk.stalls = previous_stalls_ + CountStalls();
   return disk;
 }
 
@@ -300,7 +300,7 @@ absl::Status RocksDbStore::Probe() {
 absl::Status RocksDbStore::Reopen() {
   const std::unique_lock lock(db_mutex_);
   const std::lock_guard log_lock(log_mutex_);
-  if (db_ != nullptr) former_stalls_ += CountStalls();
+  if (db_ != nullptr) previous_stalls_ += CountStalls();
   db_ = nullptr;
   absl::Status opened;
   if (const rocksdb::Status cut = files_->CutUncommitted(); !cut.ok()) {

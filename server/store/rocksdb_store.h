@@ -135,7 +135,7 @@ class RocksDbStore : public Store {
   absl::Status MakeDirectories();
   absl::Status OpenDb();
   // Opens the database, using the space of the reserve if the disk is full.
-  absl::Status OpenDbInRoom();
+  absl::Status OpenDbWithReserve();
   // Opens the database for reading, without its lock.
   rocksdb::Status OpenForReading();
   absl::Status Lock();
@@ -193,7 +193,7 @@ class RocksDbStore : public Store {
   mutable std::shared_mutex db_mutex_;
   std::unique_ptr<rocksdb::DB> db_;
   // Stalls before the database was last reopened, which resets its own count.
-  uint64_t former_stalls_ = 0;
+  uint64_t previous_stalls_ = 0;
 
   // Held while the log is written or synced.
   std::mutex log_mutex_;

@@ -59,14 +59,14 @@ struct Change {
   // For a change within an incarnation: the hull's revisions after all batches before this one.
   std::shared_ptr<const HullRevisions> before;
   // For a change within an incarnation: the number of vertices before the change.
-  uint64_t former_vertices = 0;
+  uint64_t previous_vertices = 0;
   // Layout of the hull's vertices before the change.
-  VertexLayout former_layout;
+  VertexLayout previous_layout;
   VertexChange vertex_change = VertexChange::kNone;
   std::vector<Vector> vertices;
   // The writer, if the change is a chunk.
   std::optional<WriterSequence> writer;
-  // The incarnation that this one replaces, if any.
+  // The hull that this incarnation replaces, if any.
   std::optional<StoredHull> replaced;
   // The body after the change, or the deleted body. If set, the fields about a hull are unused.
   std::shared_ptr<StoredBody> body;
@@ -88,7 +88,7 @@ struct PeerChange {
   // Revision at which the latest incarnation ended; 0: none ended.
   uint64_t ended_at = 0;
   // First incarnation that ended; nullopt if none ended or it is unknown.
-  std::optional<Incarnation> former;
+  std::optional<Incarnation> previous;
   // The current hull or body, if any. DATA_LOSS: it is damaged.
   std::optional<absl::StatusOr<StoredHull>> hull;
   std::optional<absl::StatusOr<StoredBody>> body;
@@ -109,7 +109,7 @@ struct PeerChanges {
   // That revision; 0: no new changes.
   uint64_t revision = 0;
   std::map<std::string, PeerChange> by_id;
-  // Totals at that revision, if Store::finds_records().
+  // Totals at that revision, if Store::supports_lookup().
   StoreTotals totals;
 };
 
@@ -168,7 +168,7 @@ struct RecordKinds {
   bool bodies = false;
 };
 
-// Failed operations so far, each counted once, by the refused system call.
+// Failed operations so far, each counted once, by the system call that failed.
 struct StoreFailures {
   // Writes, and reopening the store after an error.
   uint64_t write = 0;
@@ -224,23 +224,23 @@ class Store {
   virtual absl::StatusOr<uint64_t> LoadSequence(const HullRecord& hull,
                                                 const std::string& writer_id) = 0;
 
-  // True if single records can be looked up at low cost, so that a start need not read them all.
-  // Results of the following two include everything committed before the call, by any server.
-  // UNAVAILABLE: the store cannot be read.
-  virtual bool finds_records() const { return false; }
+  // True if the store can look up single records at low cost, so that they need not all be read at
+  // startup. The results of the next two functions include everything committed before the call, by
+  // any server. UNAVAILABLE: the store cannot be read.
+  virtual bool supports_lookup() const { return false; }
   // Returns the hulls and bodies with these IDs.
   virtual absl::StatusOr<FoundRecords> FindRecords(std::span<const std::string> /*ids*/) {
     return absl::UnimplementedError("this store does not support record lookups");
   }
-  // Returns up to `most` records of these kinds in byte order, with IDs that start with `prefix`
+  // Returns up to `limit` records of these kinds in byte order, with IDs that start with `prefix`
   // and follow `after`. Returns fewer, but at least one, if they exceed kMaxListedBytes.
   virtual absl::StatusOr<FoundRecords> ListRecords(const std::string& /*prefix*/,
-                                                   const std::string& /*after*/, size_t /*most*/,
+                                                   const std::string& /*after*/, size_t /*limit*/,
                                                    RecordKinds /*kinds*/) {
     return absl::UnimplementedError("this store does not support record lookups");
   }
   static constexpr uint64_t kMaxListedBytes = 16 << 20;
-  // Totals at revision(), if finds_records(). Not concurrent with Commit.
+  // Totals at revision(), if supports_lookup(). Not concurrent with Commit.
   virtual StoreTotals totals() const { return {}; }
 
   // Returns the writers of the hull in byte order of the IDs. FAILED_PRECONDITION: the store is in

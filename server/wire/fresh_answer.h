@@ -44,8 +44,7 @@ void EndFresh(Registry& registry, TaskPool& pool, UnaryCall* call, Answer answer
   });
 }
 
-// Ends a unary call that lists records of these kinds, as EndFresh. add: adds an entry to the
-// reply.
+// Like EndFresh, for a call that lists records of these kinds. add: adds an entry to the reply.
 template <typename UnaryCall, typename AddEntry>
 void EndListed(Registry& registry, TaskPool& pool, UnaryCall* call, Rpc rpc, RecordKinds kinds,
                AddEntry add) {
@@ -70,7 +69,7 @@ void EndListed(Registry& registry, TaskPool& pool, UnaryCall* call, Rpc rpc, Rec
         EncodePageToken(rpc, prefix, page->entries.back().record.hull_id));
     return absl::OkStatus();
   };
-  EndFresh(registry, pool, call, answer, !registry.store().finds_records());
+  EndFresh(registry, pool, call, answer, !registry.store().supports_lookup());
 }
 
 // Ends a unary call that deletes a hull or a body after the deletion is committed. kind: "hull" or

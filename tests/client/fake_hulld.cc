@@ -145,8 +145,8 @@ class FakeHulld::Hulls final : public v1::HullService::Service {
     response->mutable_header()->set_store_id("store");
     response->mutable_header()->set_revision(100 + fake_.list_requests_.size());
     // Pages are small, so that clients follow several.
-    const int asked = static_cast<int>(request->page_size());
-    const int size = asked == 0 ? 3 : std::min(3, asked);
+    const int requested = static_cast<int>(request->page_size());
+    const int size = requested == 0 ? 3 : std::min(3, requested);
     auto at = request->page_token().empty() ? fake_.hulls_.lower_bound(request->prefix())
                                             : fake_.hulls_.upper_bound(request->page_token());
     for (; at != fake_.hulls_.end() && at->first.rfind(request->prefix(), 0) == 0; ++at) {

@@ -51,7 +51,7 @@ class Watches : public server::ServerTest {
     server_.reset();
     std::filesystem::remove_all(directory_);
   }
-  // Sets a patience of 2 s, and a clock that only the test and the client's waits advance.
+  // Sets a reconnect timeout of 2 s, and a clock that only the test and the client's waits advance.
   void UseOwnClock() {
     options_.timeout = std::chrono::seconds(2);
     options_.retry.now = [this] {
@@ -128,8 +128,8 @@ TEST_F(Watches, WatchesOfHullsResume) {
   EXPECT_GT(waits_, 0);
 }
 
-// The patience applies to a missing server, not to an idle one: it starts with the first failure,
-// so the clock is unused before that.
+// The reconnect timeout applies to a missing server, not to an idle one: it starts with the first
+// failure, so the clock is unused before that.
 TEST_F(Watches, LongQuietWatchesContinue) {
   UseOwnClock();
   const Client client(options_);

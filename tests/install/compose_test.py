@@ -23,10 +23,10 @@ def services(path):
 
 
 class Compose(unittest.TestCase):
-    def test_there_are_files(self):
+    def test_both_files_exist(self):
         self.assertEqual([path.name for path in FILES], ['compose.many.yaml', 'compose.yaml'])
 
-    def test_what_a_service_uses_is_declared_or_a_file(self):
+    def test_everything_that_a_service_names_exists(self):
         for path in FILES:
             content = yaml.safe_load(path.read_text())
             for name, service in content['services'].items():

@@ -93,7 +93,7 @@ class Sbom(unittest.TestCase):
         self.assertEqual({self.names[end] for _, end in self.related('DESCRIBES')},
                          {'hulld', 'hullctl'})
 
-    def test_it_says_under_which_license_they_are(self):
+    def test_it_states_the_license_of_both_programs(self):
         declared = {package['name']: package['licenseDeclared']
                     for package in self.document['packages']}
         self.assertEqual({declared['hulld'], declared['hullctl']}, {'Apache-2.0'})

@@ -41,14 +41,14 @@ Operation GetAt(uint64_t invoked, uint64_t returned, uint64_t revision,
 }
 
 // Returns a query at these revisions of the body, a, and c, with a certificate that names them.
-Operation AskAt(uint64_t invoked, uint64_t returned, uint64_t revision, uint64_t a, uint64_t c,
-                bool touching) {
-  Operation operation = Answered(Kind::kAsk, invoked, returned, revision);
+Operation BodyQueryAt(uint64_t invoked, uint64_t returned, uint64_t revision, uint64_t a,
+                      uint64_t c, bool touching) {
+  Operation operation = Answered(Kind::kBodyQuery, invoked, returned, revision);
   operation.create_revision = 10;
   operation.probe = kPoint;
   operation.touching = touching;
   if (touching) operation.deciding = "a";
-  operation.tells_pieces = true;
+  operation.lists_pieces = true;
   operation.pieces = {"a", "c"};
   operation.others = {{"a", a, a, "", a}, {"c", c, c, "", c}};
   return operation;
@@ -83,35 +83,35 @@ std::string FaultOf(const std::vector<Operation>& of_body) {
 
 TEST(BodyCheck, AcceptsAnswersOfOneInstant) {
   EXPECT_EQ(FaultOf({}), "");
-  EXPECT_EQ(FaultOf({AskAt(10, 40, 10, 1, 1, true)}), "");
-  EXPECT_EQ(FaultOf({AskAt(10, 40, 10, 2, 1, false)}), "");
-  EXPECT_EQ(FaultOf({AskAt(10, 40, 10, 2, 2, false), GetAt(10, 40, 10, {"a", "c"})}), "");
+  EXPECT_EQ(FaultOf({BodyQueryAt(10, 40, 10, 1, 1, true)}), "");
+  EXPECT_EQ(FaultOf({BodyQueryAt(10, 40, 10, 2, 1, false)}), "");
+  EXPECT_EQ(FaultOf({BodyQueryAt(10, 40, 10, 2, 2, false), GetAt(10, 40, 10, {"a", "c"})}), "");
 }
 
 // Each version existed during the call, but never all at the same time.
 TEST(BodyCheck, RefusesHullsOfPiecesThatNeverCoexisted) {
-  EXPECT_NE(FaultOf({AskAt(10, 40, 10, 1, 2, true)}), "");
-  EXPECT_NE(FaultOf({AskAt(33, 40, 10, 2, 1, false)}), "");
+  EXPECT_NE(FaultOf({BodyQueryAt(10, 40, 10, 1, 2, true)}), "");
+  EXPECT_NE(FaultOf({BodyQueryAt(33, 40, 10, 2, 1, false)}), "");
 }
 
 TEST(BodyCheck, RefusesABodyAndAHullThatNeverCoexisted) {
   const Operation put = PutAt(25, 26, 11, {"c", "a"});
-  EXPECT_EQ(FaultOf({put, AskAt(10, 40, 10, 1, 1, true)}), "");
-  EXPECT_NE(FaultOf({put, AskAt(10, 40, 11, 1, 1, true)}), "");
-  EXPECT_EQ(FaultOf({put, AskAt(10, 40, 11, 2, 2, false)}), "");
-  EXPECT_NE(FaultOf({put, AskAt(10, 40, 10, 2, 2, false)}), "");
+  EXPECT_EQ(FaultOf({put, BodyQueryAt(10, 40, 10, 1, 1, true)}), "");
+  EXPECT_NE(FaultOf({put, BodyQueryAt(10, 40, 11, 1, 1, true)}), "");
+  EXPECT_EQ(FaultOf({put, BodyQueryAt(10, 40, 11, 2, 2, false)}), "");
+  EXPECT_NE(FaultOf({put, BodyQueryAt(10, 40, 10, 2, 2, false)}), "");
 }
 
 TEST(BodyCheck, RefusesARelationThatDoesNotFollowFromThePieces) {
-  EXPECT_NE(FaultOf({AskAt(10, 40, 10, 1, 1, false)}), "");
-  EXPECT_NE(FaultOf({AskAt(10, 40, 10, 2, 1, true)}), "");
+  EXPECT_NE(FaultOf({BodyQueryAt(10, 40, 10, 1, 1, false)}), "");
+  EXPECT_NE(FaultOf({BodyQueryAt(10, 40, 10, 2, 1, true)}), "");
   // A piece that does not touch cannot be the deciding one.
-  Operation ask = AskAt(10, 40, 10, 1, 1, true);
+  Operation ask = BodyQueryAt(10, 40, 10, 1, 1, true);
   ask.deciding = "c";
   EXPECT_NE(FaultOf({ask}), "");
   // An answer without the names of the pieces is refused as well.
-  ask = AskAt(23, 24, 10, 2, 1, true);
-  ask.tells_pieces = false;
+  ask = BodyQueryAt(23, 24, 10, 2, 1, true);
+  ask.lists_pieces = false;
   ask.pieces.clear();
   ask.others.clear();
   EXPECT_NE(FaultOf({ask}), "");
@@ -122,8 +122,8 @@ TEST(BodyCheck, RefusesARelationThatDoesNotFollowFromThePieces) {
 TEST(BodyCheck, RefusesPiecesFromAnotherRevision) {
   EXPECT_NE(FaultOf({GetAt(7, 8, 10, {"a"})}), "");
   EXPECT_NE(FaultOf({GetAt(7, 8, 10, {"c", "a"})}), "");
-  EXPECT_NE(FaultOf({PutAt(7, 8, 11, {"a"}), AskAt(10, 20, 11, 1, 1, true)}), "");
-  Operation ask = AskAt(10, 20, 11, 1, 1, true);
+  EXPECT_NE(FaultOf({PutAt(7, 8, 11, {"a"}), BodyQueryAt(10, 20, 11, 1, 1, true)}), "");
+  Operation ask = BodyQueryAt(10, 20, 11, 1, 1, true);
   ask.pieces = {"a"};
   ask.others.pop_back();
   EXPECT_EQ(FaultOf({PutAt(7, 8, 11, {"a"}), ask}), "");
@@ -155,16 +155,16 @@ TEST(BodyCheck, APutWithoutAnAnswerMayOrMayNotHaveHappened) {
 }
 
 TEST(BodyCheck, ExistingBodiesAreNotReportedMissing) {
-  EXPECT_NE(FaultOf({Missing(AskAt(10, 40, 0, 0, 0, false), "")}), "");
-  EXPECT_NE(FaultOf({Missing(AskAt(10, 40, 0, 0, 0, false), "c")}), "");
-  EXPECT_EQ(FaultOf({Missing(AskAt(4, 40, 0, 0, 0, false), "")}), "");
+  EXPECT_NE(FaultOf({Missing(BodyQueryAt(10, 40, 0, 0, 0, false), "")}), "");
+  EXPECT_NE(FaultOf({Missing(BodyQueryAt(10, 40, 0, 0, 0, false), "c")}), "");
+  EXPECT_EQ(FaultOf({Missing(BodyQueryAt(4, 40, 0, 0, 0, false), "")}), "");
   Operation gone = Answered(Kind::kDelete, 33, 34, 3);
   gone.store_id = "c";
-  Operations operations = With({Missing(AskAt(10, 40, 0, 0, 0, false), "c")});
+  Operations operations = With({Missing(BodyQueryAt(10, 40, 0, 0, 0, false), "c")});
   operations["c"].push_back(gone);
   EXPECT_EQ(JointLinearizabilityFault(operations), "");
   // A piece cannot be missing from a body that does not contain it.
-  operations = With({PutAt(7, 8, 11, {"a"}), Missing(AskAt(10, 40, 0, 0, 0, false), "c")});
+  operations = With({PutAt(7, 8, 11, {"a"}), Missing(BodyQueryAt(10, 40, 0, 0, 0, false), "c")});
   operations["c"].push_back(gone);
   EXPECT_NE(JointLinearizabilityFault(operations), "");
 }
@@ -187,7 +187,7 @@ TEST(BodyCheck, ARequestedRevisionIsSeen) {
   EXPECT_NE(fault_of(version), "");
   version.revision = version.create_revision = 2;
   EXPECT_EQ(fault_of(version), "");
-  Operation ask = AskAt(100, 101, 10, 2, 2, false);
+  Operation ask = BodyQueryAt(100, 101, 10, 2, 2, false);
   EXPECT_EQ(FaultOf({ask}), "");
   ask.others.back().at_least_revision = 3;
   EXPECT_THAT(FaultOf({ask}), HasSubstr("of the store of c, requested with at least revision 3"));
@@ -199,7 +199,7 @@ TEST(BodyCheck, RefusesAnOrderThatContradictsRevisions) {
   operations["a"].push_back(ReplaceAt(41, 60, 5, kWith));
   operations["b"].push_back(PutAt(41, 60, 20, {"a"}));
   // The body put later was seen with the hull's earlier version.
-  Operation ask = AskAt(41, 60, 20, 2, 0, false);
+  Operation ask = BodyQueryAt(41, 60, 20, 2, 0, false);
   ask.pieces = {"a"};
   ask.others.pop_back();
   operations["b"].push_back(ask);

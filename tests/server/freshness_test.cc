@@ -145,7 +145,7 @@ TEST_F(FreshReads, QueriesThatWaitForTheStoreEndWhenCancelled) {
   for (Call& call : calls) ask(call);
   EXPECT_EQ(next()->status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
   const auto unanswered = [this] {
-    return PostgresCluster::Shared().Ask(
+    return PostgresCluster::Shared().RunSql(
         database_,
         "SELECT pid || ' ' || query_start FROM pg_stat_activity WHERE wait_event_type = 'Lock' "
         "AND datname = current_database() ORDER BY query_start LIMIT 1");
@@ -158,16 +158,16 @@ TEST_F(FreshReads, QueriesThatWaitForTheStoreEndWhenCancelled) {
   }
   // After the server notices a cancellation, it admits another call; before that, it refuses it.
   const auto hulls = v1::HullService::NewStub(Connect(0));
-  grpc::Status asked;
+  grpc::Status status;
   do {
     grpc::ClientContext context;
     v1::GetHullRequest request;
     v1::GetHullResponse response;
     request.set_hull_id("h");
     request.mutable_freshness()->mutable_max_staleness()->set_seconds(3600);
-    asked = hulls->GetHull(&context, request, &response);
-  } while (asked.error_code() == grpc::StatusCode::RESOURCE_EXHAUSTED);
-  EXPECT_TRUE(asked.ok()) << asked.error_message();
+    status = hulls->GetHull(&context, request, &response);
+  } while (status.error_code() == grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_TRUE(status.ok()) << status.error_message();
   // The store has not answered in the meantime.
   EXPECT_EQ(unanswered(), first);
   holder.reset();

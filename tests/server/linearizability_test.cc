@@ -243,13 +243,13 @@ TEST(LinearizabilityCheck, RefusesAReplaceThatWasLost) {
   EXPECT_NE(LinearizabilityFault(After({replace, MeshAt(7, 8, 3, 0x20)})), "");
   EXPECT_NE(LinearizabilityFault(After({replace, ProbeAt(7, 8, 3, 5, true)})), "");
   EXPECT_NE(LinearizabilityFault(After({replace, GetAt(7, 8, 3, 1, 1)})), "");
-  // Appends to the former hull have no effect on the new one, and none succeeds later.
+  // Appends to the previous hull have no effect on the new one, and none succeeds later.
   EXPECT_NE(LinearizabilityFault(After({replace, AppendAt(7, 8, 4, 8, 3, "w", 2)})), "");
 }
 
 TEST(LinearizabilityCheck, RefusesAPartlyAppliedReplace) {
   const Operation replace = ReplaceAt(5, 8, 3, 0xc0);
-  // New points are missing before or after the answer, or former ones remain.
+  // New points are missing before or after the answer, or previous ones remain.
   EXPECT_NE(LinearizabilityFault(After({replace, MeshAt(6, 7, 3, 0x40)})), "");
   EXPECT_NE(LinearizabilityFault(After({replace, MeshAt(9, 10, 3, 0x80)})), "");
   EXPECT_NE(LinearizabilityFault(After({replace, MeshAt(9, 10, 3, 0xe0)})), "");
@@ -263,7 +263,7 @@ TEST(LinearizabilityCheck, RefusesAPartlyAppliedReplace) {
             "");
   EXPECT_NE(LinearizabilityFault(After({replace, MeshAt(9, 10, 3, 0xc0), GetAt(11, 12, 3, 1, 2)})),
             "");
-  // The former writer's sequence is still known.
+  // The previous writer's sequence is still known.
   Operation open = GetAt(9, 10, 3, 3, 2);
   open.kind = Kind::kOpen;
   open.writer = "w";

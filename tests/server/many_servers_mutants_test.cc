@@ -33,11 +33,11 @@ class ManyServersMutants : public ManyServersTest {
   }
 };
 
-TEST_F(ManyServersMutants, ABatchLooksUpOneHullByItself) { ExpectFound(); }
+TEST_F(ManyServersMutants, FirstHullIsLookedUpSeparately) { ExpectFound(); }
 
-TEST_F(ManyServersMutants, ABodyMayChangeWhileItsPiecesAreRead) { ExpectFound(); }
+TEST_F(ManyServersMutants, BodyIsReplacedDuringPieceLookup) { ExpectFound(); }
 
-TEST_F(ManyServersMutants, AStreamKeepsAnswersAboutHullsThatChanged) { ExpectFound(); }
+TEST_F(ManyServersMutants, StreamKeepsStaleAnswers) { ExpectFound(); }
 
 }  // namespace many_servers_mutants_test
 }  // namespace hulld::server

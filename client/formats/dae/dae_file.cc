@@ -73,7 +73,8 @@ class DaeWalk {
     for (LengthScale& scale : scale_) {
       const auto product = scale.Times(document_.unit());
       if (product) scale = *product;
-      if (!product) Fail(document_.root(), "has a unit that, times the scale, is beyond double");
+      if (!product)
+        Fail(document_.root(), "has a unit that overflows a double when multiplied by the scale");
     }
     VisitScene();
     if (vertices_ == 0) {
@@ -138,7 +139,7 @@ class DaeWalk {
       }
       if (kind == "instance_controller") {
         Fail(child,
-             "shows a mesh with a skin or morph targets, which is not supported; "
+             "instantiates a mesh with a skin or morph targets, which is not supported; "
              "export it as a plain mesh");
       }
     }
@@ -209,7 +210,7 @@ class DaeWalk {
   Vector UnitVector(xml_node element, const Vector& v) {
     const double length = std::hypot(v[0], v[1], v[2]);
     if (!(length > 0)) {
-      Fail(element, "has no direction: a length of 0");
+      Fail(element, "has a direction of length 0");
       return {};
     }
     return {v[0] / length, v[1] / length, v[2] / length};

@@ -69,8 +69,7 @@ class DaeMeshReader {
     const std::array<size_t, 3> places = PlacesOf(accessor);
     const size_t last = *std::max_element(places.begin(), places.end());
     if (last >= stride) {
-      document_.Fail(accessor,
-                     absl::StrCat("has stride ", stride, ", without room for x, y, and z"));
+      document_.Fail(accessor, absl::StrCat("has stride ", stride, ", too small for x, y, and z"));
     }
     std::vector<std::array<double, 3>>& vertices = mesh_.vertices;
     uint64_t next = 0;
@@ -108,7 +107,7 @@ class DaeMeshReader {
     const auto is_named = [](const std::optional<size_t>& at) { return at.has_value(); };
     if (std::none_of(named.begin(), named.end(), is_named)) return {0, 1, 2};
     if (!std::all_of(named.begin(), named.end(), is_named)) {
-      document_.Fail(accessor, "has not all of the parameters X, Y, and Z");
+      document_.Fail(accessor, "lacks some of the parameters X, Y, and Z");
       return {};
     }
     return {*named[0], *named[1], *named[2]};
@@ -152,13 +151,14 @@ class DaeMeshReader {
       if (next++ % size != place) return;
       uint64_t index = 0;
       if (!ParseUnsigned(word, &index) || index >= limit) {
-        document_.FailAt(word.data(), absl::StrCat(Quoted(word), " names no vertex; the mesh has ",
-                                                   limit, ", counted from 0"));
+        document_.FailAt(word.data(),
+                         absl::StrCat(Quoted(word), " is not the index of a vertex; the mesh has ",
+                                      Counted(limit, "vertex", "vertices"), ", counted from 0"));
       }
       corners.push_back(static_cast<uint32_t>(index));
     });
     if (count % size != 0) {
-      document_.Fail(list, absl::StrCat("has ", count, " indices, not ", size, " for each corner"));
+      document_.Fail(list, absl::StrCat("has ", count, " indices, not a multiple of ", size));
     }
     return corners;
   }
@@ -171,8 +171,8 @@ class DaeMeshReader {
       const size_t size = kind == "lines" ? 2 : 3;
       for (size_t i = 0; size == 3 && i + 2 < corners.size(); i += 3) AddFan(corners, i, 3);
       if (corners.size() % size != 0) {
-        document_.Fail(primitives, absl::StrCat("has ", corners.size(), " corners, not ", size,
-                                                " for each one"));
+        document_.Fail(primitives,
+                       absl::StrCat("has ", corners.size(), " corners, not a multiple of ", size));
       }
       return corners.size() / size;
     }

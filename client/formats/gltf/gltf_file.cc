@@ -112,7 +112,8 @@ class GltfWalk {
 
   // Moves each vertex by the weighted mean of its joints' transforms in the file's pose. Returns
   // false if the primitive has no joints.
-  bool Bend(const Struct& attributes, const std::vector<Affine>& joints, Primitive* primitive) {
+  bool ApplySkin(const Struct& attributes, const std::vector<Affine>& joints,
+                 Primitive* primitive) {
     auto& vertices = primitive->mesh.vertices;
     std::vector<std::array<double, 3>> sums(vertices.size());
     std::vector<double> totals(vertices.size());
@@ -209,11 +210,11 @@ class GltfWalk {
     Morph(object, weights, primitive);
     const auto skin = document_.IntegerOf(node, "skin");
     // A mesh with a skin is placed by the joints alone.
-    const bool bent = ok() && skin && Bend(attributes, JointsOf(*skin), primitive);
+    const bool skinned = ok() && skin && ApplySkin(attributes, JointsOf(*skin), primitive);
     if (!ok()) return;
     if (index) KeepOnly(corners, &primitive->mesh);
     vertices_ += vertices.size();
-    if (X_WN != nullptr && !bent) {
+    if (X_WN != nullptr && !skinned) {
       for (auto& vertex : vertices) vertex = *X_WN * vertex;
       primitive->is_float = false;
     }

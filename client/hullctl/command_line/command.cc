@@ -171,18 +171,18 @@ Option Command::AddParsed(const std::string& name,
   return Option(app_->add_option_function<std::string>(name, take, help), description);
 }
 
-Option Command::AddNumber(const std::string& name, uint64_t least, uint64_t most,
+Option Command::AddNumber(const std::string& name, uint64_t min, uint64_t max,
                           const std::string& help, std::function<void(uint64_t)> take) {
-  const auto parse = [least, most, take = std::move(take)](const std::string& text) {
+  const auto parse = [min, max, take = std::move(take)](const std::string& text) {
     uint64_t number = 0;
-    if (ParseUnsigned(text, &number) && number >= least && number <= most) {
+    if (ParseUnsigned(text, &number) && number >= min && number <= max) {
       take(number);
       return absl::OkStatus();
     }
     return absl::InvalidArgumentError(
-        most == kAnyNumber
-            ? absl::StrCat(Quoted(text), " is not a whole number of at least ", least)
-            : absl::StrCat(Quoted(text), " is not a whole number from ", least, " to ", most));
+        max == kAnyNumber
+            ? absl::StrCat(Quoted(text), " is not a whole number of at least ", min)
+            : absl::StrCat(Quoted(text), " is not a whole number from ", min, " to ", max));
   };
   return AddParsed(name, parse, help).ValueName("N");
 }

@@ -98,13 +98,13 @@ class Command {
     };
     return AddParsed(name, take, help).OneOf(names);
   }
-  // Adds an option for a decimal integer from `least` to `most`. (CLI11 itself reads 010 as eight.)
-  Option AddNumber(const std::string& name, uint64_t least, uint64_t most, const std::string& help,
+  // Adds an option for a decimal integer from `min` to `max`. (CLI11 itself reads 010 as eight.)
+  Option AddNumber(const std::string& name, uint64_t min, uint64_t max, const std::string& help,
                    std::function<void(uint64_t)> take);
   template <typename T>
-  Option AddNumber(const std::string& name, uint64_t least, uint64_t most, const std::string& help,
+  Option AddNumber(const std::string& name, uint64_t min, uint64_t max, const std::string& help,
                    T* value) {
-    return AddNumber(name, least, most, help,
+    return AddNumber(name, min, max, help,
                      [value](uint64_t number) { *value = static_cast<T>(number); });
   }
   // Adds an option for a finite length of at least 0.

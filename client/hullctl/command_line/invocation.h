@@ -81,8 +81,8 @@ struct Invocation {
 
   Client MakeClient() const;
 
-  // With --output json or name, prints the message or the name. Returns false with other formats,
-  // which the command prints itself.
+  // With --output json or name, prints the message or the name. Returns false for other formats,
+  // which the command itself must print.
   bool PrintForPrograms(const google::protobuf::Message& message, const std::string& name) const;
 
   // Reports a failed call with its remedy; returns the exit code for its status.

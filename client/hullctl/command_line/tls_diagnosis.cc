@@ -14,7 +14,7 @@
 namespace hulld {
 namespace {
 
-constexpr int kPatienceSeconds = 2;
+constexpr int kTimeoutSeconds = 2;
 
 struct Free {
   void operator()(BIO* bio) const { BIO_free_all(bio); }
@@ -55,14 +55,14 @@ Owned<SSL_CTX> MakeContext(const ConnectionSecurity& security) {
 // Returns null if the server does not answer.
 Owned<BIO> Connect(const std::string& server) {
   Owned<BIO> bio(BIO_new_connect(server.c_str()));
-  if (bio == nullptr || BIO_do_connect_retry(bio.get(), kPatienceSeconds, 50) != 1) return nullptr;
+  if (bio == nullptr || BIO_do_connect_retry(bio.get(), kTimeoutSeconds, 50) != 1) return nullptr;
   int fd = -1;
   BIO_get_fd(bio.get(), &fd);
   // BIO_do_connect_retry leaves the socket unchanged; bounds waiting from here on.
   BIO_socket_nbio(fd, 0);
-  const timeval patience = {kPatienceSeconds, 0};
-  setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
-  setsockopt(fd, SOL_SOCKET, SO_SNDTIMEO, &patience, sizeof patience);
+  const timeval timeout = {kTimeoutSeconds, 0};
+  setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &timeout, sizeof timeout);
+  setsockopt(fd, SOL_SOCKET, SO_SNDTIMEO, &timeout, sizeof timeout);
   return bio;
 }
 

@@ -96,7 +96,7 @@ class BatchRun {
     versions_.clear();
     piece_hulls_.clear();
     problems_.clear();
-    return AskBatch(
+    return QueryBatch(
         client_, request,
         [&](const v1::BatchCheckCollisionsResponse& part) {
           TakeHead(part);

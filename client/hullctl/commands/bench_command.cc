@@ -80,11 +80,11 @@ std::string CodeName(absl::StatusCode code) { return absl::StatusCodeToString(co
 void PrintHistogram(const LatencyHistogram& latencies, std::ostream& out) {
   constexpr size_t kWidth = 50;
   const std::vector<LatencyHistogram::Row> rows = latencies.Rows();
-  uint64_t most = 1;
-  for (const LatencyHistogram::Row& row : rows) most = std::max(most, row.count);
+  uint64_t max_count = 1;
+  for (const LatencyHistogram::Row& row : rows) max_count = std::max(max_count, row.count);
   for (const LatencyHistogram::Row& row : rows) {
     // A bar has at least one character.
-    const size_t length = (row.count * kWidth + most - 1) / most;
+    const size_t length = (row.count * kWidth + max_count - 1) / max_count;
     out << absl::StrFormat("  %7s - %-7s %10u  %s\n", TimeText(row.from), TimeText(row.to),
                            row.count, std::string(length, '#'));
   }
@@ -105,8 +105,8 @@ void PrintLoadTable(const LoadArguments& arguments, const LoadResult& result, st
   }
   if (result.missed > 0) {
     table.Row(
-        {"missed",
-         absl::StrCat(result.missed, " requests were due but not sent; the rate was not reached")});
+        {"missed", absl::StrCat(result.missed,
+                                " requests were due but not sent; the rate was not sustained")});
   }
   for (size_t i = 0; succeeded > 0 && i < std::size(kPercentiles); ++i) {
     table.Row({absl::StrCat("latency ", kPercentileNames[i]),

@@ -216,7 +216,7 @@ const char* FirstGiven(std::initializer_list<Given> options) {
 }
 
 // INVALID_ARGUMENT: an option that applies only to pairs is combined with --points.
-absl::Status RefuseOptionsOfPairs(const PairArguments& arguments) {
+absl::Status CheckPointOptions(const PairArguments& arguments) {
   const v1::Wanted& wanted = arguments.details.wanted;
   const char* const name =
       FirstGiven({{!arguments.b.empty(), "B"},
@@ -245,7 +245,7 @@ absl::Status RefuseOptionsOfPairs(const PairArguments& arguments) {
 
 // INVALID_ARGUMENT: two options exclude each other. The server refuses them as well, but names the
 // fields of the contract.
-absl::Status RefuseConflicts(const PairArguments& arguments) {
+absl::Status CheckConflicts(const PairArguments& arguments) {
   const v1::Wanted& wanted = arguments.details.wanted;
   const Given textbook = {arguments.details.method == v1::METHOD_TEXTBOOK_SAT, "--textbook"};
   const Given tolerance = {arguments.details.tolerance.value_or(0) > 0, "--tolerance"};
@@ -312,7 +312,7 @@ absl::Status WithFileHint(const absl::Status& error, const PairArguments& argume
 }
 
 ExitCode CheckPointsOfFile(const Invocation& run, const PairArguments& arguments) {
-  absl::Status status = RefuseOptionsOfPairs(arguments);
+  absl::Status status = CheckPointOptions(arguments);
   v1::Placement hull = arguments.request.a();
   if (status.ok()) status = SetSide(run, arguments.a, &hull);
   if (!status.ok()) return run.FailUsage(status);
@@ -320,7 +320,7 @@ ExitCode CheckPointsOfFile(const Invocation& run, const PairArguments& arguments
 }
 
 ExitCode CheckPair(const Invocation& run, const PairArguments& arguments) {
-  if (absl::Status status = RefuseConflicts(arguments); !status.ok()) return run.FailUsage(status);
+  if (absl::Status status = CheckConflicts(arguments); !status.ok()) return run.FailUsage(status);
   v1::CheckCollisionRequest request = arguments.request;
   if (arguments.to_a) SetMotion(*arguments.to_a, request.mutable_a());
   if (arguments.to_b) SetMotion(*arguments.to_b, request.mutable_b());
@@ -451,7 +451,7 @@ void AddCheckCommand(Command program, Invocation* invocation) {
       {{"Do they collide?", "hullctl check arm box --pose-b 0.2,0,0"},
        {"How far apart are they, and where?",
         "hullctl check arm box --pose-b 0.2,0,0 --separation --witness"},
-       {"Which way out is the shortest?", "hullctl check arm box --separation --normal"},
+       {"Which way out is shortest?", "hullctl check arm box --separation --normal"},
        {"Are they within a centimeter?", "hullctl check arm box --clearance 0.01"},
        {"With a margin of 2 mm about the arm", "hullctl check arm box --radius-a 0.002"},
        {"Two files, without a server", "hullctl check a.stl b.stl --local"},

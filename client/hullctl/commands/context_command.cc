@@ -21,7 +21,7 @@ struct ContextArguments {
 };
 
 // Returns the settings of the options with absolute paths, valid in any working directory.
-ConnectionSettings Lasting(const ConnectionSettings& flags) {
+ConnectionSettings WithAbsolutePaths(const ConnectionSettings& flags) {
   ConnectionSettings settings = flags;
   for (const ConnectionSetting& setting : kConnectionSettings) {
     const auto found = settings.find(setting.name);
@@ -59,7 +59,7 @@ ExitCode Add(const Invocation& run, const ContextArguments& arguments) {
     return run.FailUsage(
         absl::StrCat("context ", arguments.name, " already exists; pass --replace to replace it"));
   }
-  const ConnectionSettings settings = Lasting(run.flags);
+  const ConnectionSettings settings = WithAbsolutePaths(run.flags);
   // Detects a missing file, or a token readable by other users, before saving.
   const auto security = ReadSecurity(Combine({{"", settings, false}}));
   if (!security.ok()) return run.FailUsage(security.status());
@@ -197,7 +197,7 @@ void AddContextCommand(Command program, Invocation* invocation) {
   OnGiven(use, invocation, arguments, Use, /*needs_server=*/false);
   Command list = command.AddCommand("list", "List the contexts");
   OnGiven(list, invocation, ListContexts, /*needs_server=*/false);
-  Command show = command.AddCommand("show", "Show the settings in force and the source of each");
+  Command show = command.AddCommand("show", "Show the effective settings and the source of each");
   show.AddText("NAME", &arguments->name, "Show the settings as with --context NAME")
       .Completes(ValueKind::kContext);
   OnGiven(show, invocation, arguments, Show, /*needs_server=*/false);

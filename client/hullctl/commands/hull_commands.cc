@@ -114,16 +114,16 @@ void AddCreateCommand(Command program, Invocation* invocation) {
 
 void AddGetCommand(Command program, Invocation* invocation) {
   auto request = std::make_shared<v1::GetHullRequest>();
-  v1::GetHullRequest* const asked = request.get();
+  v1::GetHullRequest* const fields = request.get();
   Command command = program.AddCommand("get", "Show size, counts, and box of a hull");
-  command.AddText("ID", asked->mutable_hull_id(), "ID of the hull")
+  command.AddText("ID", fields->mutable_hull_id(), "ID of the hull")
       .Required()
       .Completes(ValueKind::kHull);
   command.AddFlag(
-      "--properties", [asked] { asked->set_properties(true); },
+      "--properties", [fields] { fields->set_properties(true); },
       "Show volume, area, centroid, and the inertia tensor about the centroid, for density 1");
   command.AddFlag(
-      "--audit", [asked] { asked->set_audit(true); },
+      "--audit", [fields] { fields->set_audit(true); },
       "Have the server check the hull with independent code");
   AddFreshnessOptions(command, invocation);
   command.SetExamples(

@@ -33,7 +33,7 @@ class SceneRun {
     absl::Status status = run_.MakeClient().FindCollisions(
         request_, [this](const v1::FindCollisionsResponse& part) { return Take(part); });
     if (status.ok() && !complete_) {
-      status = absl::InternalError("the answers end without totals");
+      status = absl::InternalError("the answers ended without totals");
     }
     bar_.Clear();
     if (status.ok() && !run_.json() && !run_.names()) PrintTotals();
@@ -122,11 +122,10 @@ struct SceneArguments {
 // Options that choose pairs and rows.
 void AddChoiceOptions(Command command, SceneArguments* arguments) {
   command
-      .AddNumber(
-          "--nearest", 1, std::numeric_limits<uint32_t>::max(),
-          "Find only the N pairs of least separation, nearest first, within --clearance if it is "
-          "given; implies --separation",
-          &arguments->nearest)
+      .AddNumber("--nearest", 1, std::numeric_limits<uint32_t>::max(),
+                 "Find only the N pairs with the smallest separation, nearest first, within "
+                 "--clearance if it is given; implies --separation",
+                 &arguments->nearest)
       .ValueName("N");
   command.AddFlag("--first", &arguments->first,
                   "Of pairs in motion, find only those that may be the first to touch");

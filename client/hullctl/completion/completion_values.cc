@@ -15,7 +15,7 @@ namespace hulld {
 namespace {
 
 // Bounds the delay for an interactive user.
-constexpr std::chrono::milliseconds kPatience(500);
+constexpr std::chrono::milliseconds kTimeout(500);
 // Maximum number of listed IDs, to keep within that delay.
 constexpr uint64_t kMaxListed = 20000;
 // Longer lists are abbreviated to ID segments, as they exceed a screen.
@@ -36,7 +36,7 @@ std::vector<Candidate> HullsAndBodies(Invocation* invocation, ValueKind kind,
                                       const std::string& start) {
   if (!ResolveConnection(invocation).ok()) return {};
   ClientOptions options = invocation->MakeClient().options();
-  options.timeout = kPatience;
+  options.timeout = kTimeout;
   options.retry.max_attempts = 1;
   const Client client(options);
   std::vector<Candidate> candidates;

@@ -41,8 +41,8 @@ struct Example {
   std::string command;
 };
 
-// A program or one of its commands: the source of its help, man page, and completion. Filled where
-// the command is declared (command_line/command.h), and nowhere else.
+// Describes a program or one of its commands; help, man page, and completion are generated from it.
+// Filled only where the command is declared (command_line/command.h).
 struct CommandDescription {
   // Including the names of parent commands: "hullctl backup save".
   std::string path;

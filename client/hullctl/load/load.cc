@@ -21,7 +21,7 @@ class LoadRun {
       : plan_(plan), stop_(stop), start_(Clock::now()) {}
 
   // Sends requests until the plan is complete.
-  LoadResult Ask(const LoadRequest& request) {
+  LoadResult RunClient(const LoadRequest& request) {
     LoadResult result;
     for (;;) {
       const uint64_t i = next_.fetch_add(1);
@@ -114,7 +114,7 @@ LoadResult RunLoad(const LoadPlan& plan, const std::vector<LoadRequest>& clients
   std::vector<std::thread> threads;
   for (const LoadRequest& client : clients) {
     threads.emplace_back([&] {
-      LoadResult part = run.Ask(client);
+      LoadResult part = run.RunClient(client);
       const std::lock_guard lock(mutex);
       Merge(std::move(part), &sum);
       --running;

@@ -62,13 +62,13 @@ class LoadSubjects::LoadClient {
         append_id_(absl::StrCat(settings_.prefix, "append-", index)),
         random_(static_cast<uint64_t>(index) + 1) {
     const auto hull = [&] { return subjects.HullId(random_.Next() % settings_.hulls); };
-    if (Asks(LoadMode::kCheck)) {
+    if (Sends(LoadMode::kCheck)) {
       for (v1::CheckCollisionRequest& request : checks_) {
         FillPlacement(hull(), random_, request.mutable_a());
         FillPlacement(hull(), random_, request.mutable_b());
       }
     }
-    if (Asks(LoadMode::kBatch)) {
+    if (Sends(LoadMode::kBatch)) {
       const uint64_t placements = std::min(kMaxPlacements, 2 * settings_.pairs);
       for (uint64_t i = 0; i < placements; ++i) {
         FillPlacement(hull(), random_, batch_.add_placements());
@@ -77,12 +77,12 @@ class LoadSubjects::LoadClient {
         batch_.add_pairs(static_cast<uint32_t>(random_.Next() % placements));
       }
     }
-    if (Asks(LoadMode::kAppend)) {
+    if (Sends(LoadMode::kAppend)) {
       points_ = MakePoints(Shape::kBall, settings_.points, static_cast<uint64_t>(index) + 1);
     }
   }
 
-  absl::StatusOr<uint64_t> Ask(uint64_t i) {
+  absl::StatusOr<uint64_t> Send(uint64_t i) {
     switch (settings_.mode) {
       case LoadMode::kCheck:
         return Check(i);
@@ -100,7 +100,7 @@ class LoadSubjects::LoadClient {
   }
 
  private:
-  bool Asks(LoadMode mode) const {
+  bool Sends(LoadMode mode) const {
     return settings_.mode == mode || settings_.mode == LoadMode::kMixed;
   }
 
@@ -179,7 +179,7 @@ std::vector<LoadRequest> LoadSubjects::MakeClients() {
   std::vector<LoadRequest> clients;
   for (int i = 0; i < settings_.clients; ++i) {
     const auto client = std::make_shared<LoadClient>(*this, i);
-    clients.emplace_back([client](uint64_t request) { return client->Ask(request); });
+    clients.emplace_back([client](uint64_t request) { return client->Send(request); });
   }
   return clients;
 }

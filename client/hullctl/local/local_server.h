@@ -43,7 +43,7 @@ class LocalServer {
   std::thread log_reader_;
 };
 
-// Builds hulls on a private server, which the first hull starts.
+// Builds hulls on a private server, which is started when the first hull is built.
 class LocalHullBuilder {
  public:
   // Returns the hull of the points. Errors of LocalServer::Start and of the server.

@@ -66,8 +66,8 @@ class BatchAnswers {
 
 }  // namespace
 
-absl::Status AskBatch(const Client& client, const v1::BatchCheckCollisionsRequest& request,
-                      const Client::BatchReceiver& on_message, const PairReceiver& receive) {
+absl::Status QueryBatch(const Client& client, const v1::BatchCheckCollisionsRequest& request,
+                        const Client::BatchReceiver& on_message, const PairReceiver& receive) {
   BatchAnswers answers(request, receive);
   const absl::Status status =
       client.BatchCheckCollisions(request, [&](const v1::BatchCheckCollisionsResponse& part) {

@@ -21,8 +21,8 @@ using PairReceiver =
 // Sends a batch and passes on the answer of each pair, in order. `on_message`, if set, receives
 // each message before its answers. Errors of the call and of both functions; INTERNAL: the answers
 // do not match the request.
-absl::Status AskBatch(const Client& client, const v1::BatchCheckCollisionsRequest& request,
-                      const Client::BatchReceiver& on_message, const PairReceiver& receive);
+absl::Status QueryBatch(const Client& client, const v1::BatchCheckCollisionsRequest& request,
+                        const Client::BatchReceiver& on_message, const PairReceiver& receive);
 
 }  // namespace hulld
 

@@ -108,8 +108,8 @@ class JudgeRun {
     for (const JudgedAnswer& answer : answers_)
       (answer.moves ? moving : resting).push_back(&answer);
     for (const auto& answers : {resting, moving}) {
-      const absl::Status asked = AskAll(answers);
-      if (!asked.ok()) return run_.Fail(asked);
+      const absl::Status status = QueryAll(answers);
+      if (!status.ok()) return run_.Fail(status);
     }
     bar_.Clear();
     std::stable_sort(wrong_.begin(), wrong_.end(), [](const WrongAnswer& a, const WrongAnswer& b) {
@@ -134,17 +134,17 @@ class JudgeRun {
   using Answers = std::span<const JudgedAnswer* const>;
 
   // Queries pairs that are all in motion or all at rest.
-  absl::Status AskAll(Answers answers) {
+  absl::Status QueryAll(Answers answers) {
     for (size_t begin = 0; begin < answers.size(); begin += kAnswersPerCall) {
       const Answers part =
           answers.subspan(begin, std::min(kAnswersPerCall, answers.size() - begin));
       HULLD_RETURN_IF_ERROR(
-          AskBatch(client_, RequestFor(part), nullptr,
-                   [&](size_t pair, const AnswerRow& row, const std::string* problem) {
-                     Take(*part[pair], row, problem);
-                     bar_.Update(++taken_);
-                     return absl::OkStatus();
-                   }));
+          QueryBatch(client_, RequestFor(part), nullptr,
+                     [&](size_t pair, const AnswerRow& row, const std::string* problem) {
+                       Take(*part[pair], row, problem);
+                       bar_.Update(++taken_);
+                       return absl::OkStatus();
+                     }));
     }
     return absl::OkStatus();
   }
@@ -299,17 +299,17 @@ class JudgeRun {
     request.mutable_wanted()->set_max_error(max_error);
     TradePoint point;
     const auto start = std::chrono::steady_clock::now();
-    const absl::Status asked =
-        AskBatch(client_, request, nullptr,
-                 [&](size_t /*pair*/, const AnswerRow& row, const std::string* problem) {
-                   if (problem == nullptr) {
-                     point.error = std::max(point.error, row.separation->bound());
-                   }
-                   return absl::OkStatus();
-                 });
+    const absl::Status status =
+        QueryBatch(client_, request, nullptr,
+                   [&](size_t /*pair*/, const AnswerRow& row, const std::string* problem) {
+                     if (problem == nullptr) {
+                       point.error = std::max(point.error, row.separation->bound());
+                     }
+                     return absl::OkStatus();
+                   });
     const std::chrono::duration<double, std::micro> time = std::chrono::steady_clock::now() - start;
     point.microseconds = time.count() / static_cast<double>(answers.size());
-    if (!asked.ok()) return asked;
+    if (!status.ok()) return status;
     return point;
   }
 

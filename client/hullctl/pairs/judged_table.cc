@@ -75,11 +75,11 @@ absl::Status ReadDistance(std::string_view cell, std::optional<double>* distance
   return read.status();
 }
 
-// Reads a number from 0 to `most`, called `what`.
-absl::Status ReadUpTo(double most, const char* what, std::string_view cell,
+// Reads a number from 0 to `max`, called `what`.
+absl::Status ReadUpTo(double max, const char* what, std::string_view cell,
                       std::optional<double>* value) {
   HULLD_ASSIGN_OR_RETURN(const auto read, NumberOf(cell));
-  if (read < 0 || read > most) {
+  if (read < 0 || read > max) {
     return absl::InvalidArgumentError(
         absl::StrCat(std::string(cell), " is not a ", what, "; leave the cell empty"));
   }
@@ -268,15 +268,15 @@ Judgement JudgeMotion(const JudgedAnswer& answer, const AnswerRow& row, double m
   const v1::FirstContact& truth = *row.first_contact;
   const bool touches = truth.has_contact_time();
   // A program may state its answer in several columns; each must be correct.
-  const bool says_contact =
+  const bool claims_contact =
       answer.contact_time || answer.colliding.value_or(false) ||
       answer.relation.value_or(v1::RELATION_SEPARATED) != v1::RELATION_SEPARATED;
-  const bool says_none =
+  const bool claims_no_contact =
       (answer.colliding && !*answer.colliding) || answer.relation == v1::RELATION_SEPARATED;
   const double said = answer.contact_time.value_or(1);
   // The end of the bracket; 1 without contact.
   const double contact = touches ? truth.contact_time() : 1;
-  if (touches ? says_none : says_contact) {
+  if (touches ? claims_no_contact : claims_contact) {
     judgement.faults.push_back(touches ? Fault::kMiss : Fault::kFalseContact);
     judgement.error = touches ? 1 - contact : 1 - said;
   }
@@ -322,7 +322,7 @@ const char* FaultName(Fault fault) {
     case Fault::kMiss:
       return "miss";
     case Fault::kTouching:
-      return "touching mistaken";
+      return "touching";
     case Fault::kDistance:
       return "distance";
     case Fault::kDepth:

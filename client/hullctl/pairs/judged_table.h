@@ -24,8 +24,8 @@ struct JudgedAnswer {
   // True if the pair moves; then its poses at the end.
   bool moves = false;
   std::array<std::array<double, 7>, 2> end_poses;
-  // The parts of the answer that the program gave. Relation: TOUCHING and OVERLAPPING count as the
-  // same if the program reports only a collision.
+  // The parts of the answer that the program gave. `colliding` is for programs that do not
+  // distinguish TOUCHING from OVERLAPPING.
   std::optional<bool> colliding;
   std::optional<v1::Relation> relation;
   std::optional<double> distance;
@@ -64,8 +64,8 @@ const char* FaultName(Fault fault);
 
 struct Judgement {
   std::vector<Fault> faults;
-  // The length by which the answer is wrong, or the time for pairs in motion; 0 if it only
-  // misjudges a touching pair.
+  // The length by which the answer is wrong, or the time for a pair in motion; 0 if only the
+  // relation of a touching pair is wrong.
   double error = 0;
   // |answer - separation| of a distance, and of a depth; 0 if the answer has none.
   double distance_error = 0;
@@ -74,7 +74,7 @@ struct Judgement {
   double time_error = 0;
 };
 
-// Largest errors that an answer may have.
+// Maximum errors of an answer that is not wrong.
 struct Allowed {
   double error = 0;
   double time_error = 0;

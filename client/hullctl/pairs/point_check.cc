@@ -45,7 +45,7 @@ class PointCheck {
     file.options.points_per_block =
         std::min({kPointsPerCall, status->limits().max_pairs_per_batch(),
                   std::max<uint64_t>(status->limits().max_placements(), 2) - 1});
-    const auto read = ReadPoints(file, [this](const PointChunk& block) { return Ask(block); });
+    const auto read = ReadPoints(file, [this](const PointChunk& block) { return Query(block); });
     bar_.Clear();
     if (!answered_.ok()) return run_.Fail(answered_);
     if (!read.ok()) return run_.FailUsage(read.status());
@@ -71,7 +71,7 @@ class PointCheck {
     return request;
   }
 
-  absl::Status Ask(const PointChunk& block) {
+  absl::Status Query(const PointChunk& block) {
     std::vector<double> xyz = block.xyz;
     xyz.insert(xyz.end(), block.xyz_float.begin(), block.xyz_float.end());
     v1::BatchCheckCollisionsRequest request = base_;
@@ -84,7 +84,7 @@ class PointCheck {
       request.add_pairs(0);
       request.add_pairs(static_cast<uint32_t>(i / 3 + 1));
     }
-    answered_ = AskBatch(
+    answered_ = QueryBatch(
         client_, request,
         [](const v1::BatchCheckCollisionsResponse& part) {
           // Only the hull can be missing, and then no point has an answer.
@@ -96,7 +96,7 @@ class PointCheck {
           Print(std::span(xyz).subspan(3 * point, 3), row, problem);
           return absl::OkStatus();
         });
-    bar_.Update(asked_ += xyz.size() / 3);
+    bar_.Update(queried_ += xyz.size() / 3);
     return answered_;
   }
 
@@ -134,7 +134,7 @@ class PointCheck {
   ProgressBar bar_;
   const v1::BatchCheckCollisionsRequest base_;
   absl::Status answered_;
-  uint64_t asked_ = 0;
+  uint64_t queried_ = 0;
   uint64_t counts_[v1::Relation_ARRAYSIZE] = {};
   uint64_t failed_ = 0;
 };

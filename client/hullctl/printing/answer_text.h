@@ -9,7 +9,7 @@
 
 namespace hulld {
 
-// Text for people, for the fields of a collision answer.
+// Formats the fields of a collision answer for people.
 
 // "SEPARATED", "TOUCHING", "OVERLAPPING"; "-" if unspecified.
 std::string RelationText(v1::Relation relation);

@@ -30,7 +30,7 @@ std::string QuoteJson(std::string_view text);
 // Returns an array of values that are already JSON.
 std::string JsonArray(const std::vector<std::string>& values);
 
-// Returns the array of what `json_of` returns for each of the items.
+// Returns a JSON array of json_of(item) for each item.
 template <typename Items, typename JsonOf>
 std::string JsonArray(const Items& items, const JsonOf& json_of) {
   std::vector<std::string> values;

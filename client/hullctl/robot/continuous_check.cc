@@ -115,34 +115,36 @@ absl::Status ContinuousCheck::RunRound(std::vector<Search>* searches) {
       first_contact[search.pair] = std::min(first_contact[search.pair], search.segment);
     }
   }
-  std::vector<Asked> asked;
+  std::vector<QueriedSpan> queried;
   for (Search& search : *searches) {
     if (search.segment > first_contact[search.pair]) search.is_done = true;
-    if (search.is_done || asked.size() >= kMaxSpans) continue;
+    if (search.is_done || queried.size() >= kMaxSpans) continue;
     const size_t count = std::min(search.open.size(), kSpansPerSearch);
-    for (size_t i = 0; i < count; ++i) asked.push_back({.search = &search, .span = search.open[i]});
+    for (size_t i = 0; i < count; ++i) {
+      queried.push_back({.search = &search, .span = search.open[i]});
+    }
   }
-  if (absl::Status motions = AskMotions(&asked); !motions.ok()) return motions;
+  if (absl::Status motions = QueryMotions(&queried); !motions.ok()) return motions;
   std::vector<std::pair<Search*, double>> times;
-  for (size_t first = 0, end = 0; first < asked.size(); first = end) {
-    while (end < asked.size() && asked[end].search == asked[first].search) ++end;
-    Divide(std::span(asked).subspan(first, end - first), asked[first].search, &times);
+  for (size_t first = 0, end = 0; first < queried.size(); first = end) {
+    while (end < queried.size() && queried[end].search == queried[first].search) ++end;
+    Divide(std::span(queried).subspan(first, end - first), queried[first].search, &times);
   }
-  if (absl::Status poses = AskPoses(times); !poses.ok()) return poses;
-  for (const Asked& one : asked) Close(one.search);
+  if (absl::Status poses = QueryPoses(times); !poses.ok()) return poses;
+  for (const QueriedSpan& one : queried) Close(one.search);
   return absl::OkStatus();
 }
 
-absl::Status ContinuousCheck::AskMotions(std::vector<Asked>* asked) {
+absl::Status ContinuousCheck::QueryMotions(std::vector<QueriedSpan>* queried) {
   v1::BatchCheckCollisionsRequest request;
   *request.mutable_packed_placements() = scope_.hulls;
   // Only the halves of a span matter.
   request.mutable_wanted()->set_max_time_error(0.25);
   request.mutable_wanted()->set_resolution(settings_.resolution / 2);
-  std::vector<Asked*> rows;
-  for (Asked& one : *asked) {
+  std::vector<QueriedSpan*> rows;
+  for (QueriedSpan& one : *queried) {
     const Search& search = *one.search;
-    if (!CanBeAsked(search, one.span)) continue;
+    if (!CanQuery(search, one.span)) continue;
     rows.push_back(&one);
     const Poses& begin = PosesAt(search.segment, one.span.begin);
     const Poses& end = PosesAt(search.segment, one.span.begin + one.span.duration);
@@ -155,19 +157,19 @@ absl::Status ContinuousCheck::AskMotions(std::vector<Asked>* asked) {
     }
   }
   if (rows.empty()) return absl::OkStatus();
-  return AskBatch(client_, request, nullptr,
-                  [&](size_t row, const AnswerRow& answer, const std::string* problem) {
-                    Asked& one = *rows[row];
-                    one.is_separated = answer.relation == v1::RELATION_SEPARATED;
-                    if (answer.first_contact.has_value()) {
-                      one.separated_until = answer.first_contact->separated_until();
-                    }
-                    if (problem != nullptr) one.search->problem = *problem;
-                    return absl::OkStatus();
-                  });
+  return QueryBatch(client_, request, nullptr,
+                    [&](size_t row, const AnswerRow& answer, const std::string* problem) {
+                      QueriedSpan& one = *rows[row];
+                      one.is_separated = answer.relation == v1::RELATION_SEPARATED;
+                      if (answer.first_contact.has_value()) {
+                        one.separated_until = answer.first_contact->separated_until();
+                      }
+                      if (problem != nullptr) one.search->problem = *problem;
+                      return absl::OkStatus();
+                    });
 }
 
-absl::Status ContinuousCheck::AskPoses(const std::vector<std::pair<Search*, double>>& times) {
+absl::Status ContinuousCheck::QueryPoses(const std::vector<std::pair<Search*, double>>& times) {
   if (times.empty()) return absl::OkStatus();
   v1::BatchCheckCollisionsRequest request;
   *request.mutable_packed_placements() = scope_.hulls;
@@ -179,29 +181,29 @@ absl::Status ContinuousCheck::AskPoses(const std::vector<std::pair<Search*, doub
       Place(object, scope_.radii[object], poses, nullptr, &request);
     }
   }
-  return AskBatch(client_, request, nullptr,
-                  [&](size_t row, const AnswerRow& answer, const std::string* problem) {
-                    const auto& [search, time] = times[row];
-                    if (problem != nullptr) search->problem = *problem;
-                    const bool meets = answer.relation == v1::RELATION_TOUCHING ||
-                                       answer.relation == v1::RELATION_OVERLAPPING ||
-                                       answer.within_clearance.value_or(false);
-                    if (meets && time <= search->contact_time.value_or(time)) {
-                      search->contact_time = time;
-                      search->relation = answer.relation;
-                    }
-                    return absl::OkStatus();
-                  });
+  return QueryBatch(client_, request, nullptr,
+                    [&](size_t row, const AnswerRow& answer, const std::string* problem) {
+                      const auto& [search, time] = times[row];
+                      if (problem != nullptr) search->problem = *problem;
+                      const bool meets = answer.relation == v1::RELATION_TOUCHING ||
+                                         answer.relation == v1::RELATION_OVERLAPPING ||
+                                         answer.within_clearance.value_or(false);
+                      if (meets && time <= search->contact_time.value_or(time)) {
+                        search->contact_time = time;
+                        search->relation = answer.relation;
+                      }
+                      return absl::OkStatus();
+                    });
 }
 
-void ContinuousCheck::Divide(std::span<const Asked> asked, Search* search,
+void ContinuousCheck::Divide(std::span<const QueriedSpan> queried, Search* search,
                              std::vector<std::pair<Search*, double>>* times) {
   std::vector<Span> left;
-  for (const Asked& one : asked) {
+  for (const QueriedSpan& one : queried) {
     if (one.is_separated) continue;
     Span span = one.span;
     if (span.duration == 1) times->insert(times->end(), {{search, 0.0}, {search, 1.0}});
-    span.is_last = CanBeAsked(*search, span) && IsLast(*search, span);
+    span.is_last = CanQuery(*search, span) && IsLast(*search, span);
     if (span.is_last) {
       left.push_back(span);
       continue;
@@ -211,7 +213,7 @@ void ContinuousCheck::Divide(std::span<const Asked> asked, Search* search,
     if (one.separated_until <= 0.5) left.push_back({span.begin, half});
     left.push_back({span.begin + half, half});
   }
-  left.insert(left.end(), search->open.begin() + static_cast<ptrdiff_t>(asked.size()),
+  left.insert(left.end(), search->open.begin() + static_cast<ptrdiff_t>(queried.size()),
               search->open.end());
   search->open = std::move(left);
 }
@@ -240,14 +242,14 @@ void ContinuousCheck::Report(const std::vector<Search>& searches) {
   }
 }
 
-double ContinuousCheck::DeviationOf(const Asked& asked, size_t side) const {
-  const uint32_t object = ObjectOf(*asked.search, side);
+double ContinuousCheck::DeviationOf(const QueriedSpan& queried, size_t side) const {
+  const uint32_t object = ObjectOf(*queried.search, side);
   if (object >= scope_.parts) return 0;
-  return segments_[asked.search->segment].bounds[object].Deviation(asked.span.duration,
-                                                                   reaches_[object]);
+  return segments_[queried.search->segment].bounds[object].Deviation(queried.span.duration,
+                                                                     reaches_[object]);
 }
 
-bool ContinuousCheck::CanBeAsked(const Search& search, const Span& span) const {
+bool ContinuousCheck::CanQuery(const Search& search, const Span& span) const {
   const auto turns_little = [&](size_t side) {
     const uint32_t object = ObjectOf(search, side);
     return object >= scope_.parts ||

@@ -100,7 +100,7 @@ class ContinuousCheck {
     bool is_done = false;
   };
   // A span of a search, and its answer.
-  struct Asked {
+  struct QueriedSpan {
     Search* search = nullptr;
     Span span;
     bool is_separated = false;
@@ -109,19 +109,19 @@ class ContinuousCheck {
 
   absl::Status AddSegments(std::span<const std::vector<double>> waypoints);
   absl::Status RunRound(std::vector<Search>* searches);
-  absl::Status AskMotions(std::vector<Asked>* asked);
+  absl::Status QueryMotions(std::vector<QueriedSpan>* queried);
   // Checks poses at times of searches.
-  absl::Status AskPoses(const std::vector<std::pair<Search*, double>>& times);
+  absl::Status QueryPoses(const std::vector<std::pair<Search*, double>>& times);
   // Replaces the queried spans, at the front of the search, with their halves that are not proven
   // free. Adds the times at which poses must be checked.
-  void Divide(std::span<const Asked> asked, Search* search,
+  void Divide(std::span<const QueriedSpan> queried, Search* search,
               std::vector<std::pair<Search*, double>>* times);
   void Close(Search* search);
   void Report(const std::vector<Search>& searches);
 
   // Returns how far a shape deviates from its motion in a span; 0 for fixed objects.
-  double DeviationOf(const Asked& asked, size_t side) const;
-  bool CanBeAsked(const Search& search, const Span& span) const;
+  double DeviationOf(const QueriedSpan& queried, size_t side) const;
+  bool CanQuery(const Search& search, const Span& span) const;
   bool IsLast(const Search& search, const Span& span) const;
   // Returns the poses of all parts.
   const Poses& PosesAt(size_t segment, double time);

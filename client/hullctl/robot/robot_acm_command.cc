@@ -113,7 +113,7 @@ absl::Status Sample(const Invocation& run, const AcmArguments& arguments, const 
       model.AppendPoses(kNoMotion, AllJointValues(model.robot, RandomValues(model.robot, &random)),
                         &poses);
     }
-    if (absl::Status asked = stream.Ask(count, poses); !asked.ok()) return asked;
+    if (absl::Status status = stream.Query(count, poses); !status.ok()) return status;
     if (!problem.ok()) return problem;
     bar.Update(done += count);
   }

@@ -84,7 +84,7 @@ class RobotCheck {
   absl::Status OpenWaypoints() { return waypoints_.Open(arguments_.joints); }
   void WarnOfLimits(uint64_t waypoint, const Waypoint& free_values);
   absl::Status CheckContinuousOptions();
-  absl::StatusOr<std::vector<Waypoint>> ReadWaypoints(size_t most);
+  absl::StatusOr<std::vector<Waypoint>> ReadWaypoints(size_t limit);
   bool IsFinished() const { return stopped_ || (arguments_.first && HasContact()); }
   bool HasContact() const { return first_.has_value() || first_event_.has_value(); }
   absl::Status CheckWaypoints(CheckScope scope);
@@ -202,9 +202,9 @@ void RobotCheck::WarnOfLimits(uint64_t waypoint, const Waypoint& free_values) {
 }
 
 // Returns the next waypoints; empty at the end.
-absl::StatusOr<std::vector<Waypoint>> RobotCheck::ReadWaypoints(size_t most) {
+absl::StatusOr<std::vector<Waypoint>> RobotCheck::ReadWaypoints(size_t limit) {
   std::vector<Waypoint> waypoints;
-  while (waypoints.size() < most) {
+  while (waypoints.size() < limit) {
     Waypoint values;
     HULLD_ASSIGN_OR_RETURN(const auto more, waypoints_.Next(&values));
     if (!more) break;
@@ -231,7 +231,7 @@ absl::Status RobotCheck::CheckWaypoints(CheckScope scope) {
     for (const Waypoint& values : waypoints) {
       model_.AppendPoses(arguments_.X_WB, AllJointValues(model_.robot, values), &poses);
     }
-    HULLD_RETURN_IF_ERROR(stream.Ask(waypoints.size(), poses));
+    HULLD_RETURN_IF_ERROR(stream.Query(waypoints.size(), poses));
     checked_ += waypoints.size();
     bar_.Update(checked_ * pairs_.size() / 2);
   }

@@ -28,7 +28,8 @@ class WaypointSource {
   WaypointSource(const Robot& robot, const std::vector<std::string>& joint_values)
       : robot_(robot), joint_values_(joint_values) {}
 
-  // Call first. INVALID_ARGUMENT: a value or the file is malformed, or the file has no waypoint.
+  // Must be called first. INVALID_ARGUMENT: a value or the file is malformed, or the file has no
+  // waypoint.
   absl::Status Open(const std::string& file);
   // Returns false at the end.
   absl::StatusOr<bool> Next(Waypoint* free_values);

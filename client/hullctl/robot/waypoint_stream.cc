@@ -23,7 +23,7 @@ WaypointStream::WaypointStream(const Client& client, CheckScope scope, v1::Wante
   lanes_ = std::clamp<size_t>(kPairsPerMessage / pairs, 1, kMaxLanes);
 }
 
-absl::Status WaypointStream::Ask(size_t count, const std::vector<double>& poses) {
+absl::Status WaypointStream::Query(size_t count, const std::vector<double>& poses) {
   const auto answer = stream_ == nullptr ? Open(count, poses) : Update(count, poses);
   return answer.ok() ? Take(*answer, count) : answer.status();
 }

@@ -36,7 +36,7 @@ class WaypointStream {
   // Queries `count` waypoints, at most lanes(). poses: of all parts, seven numbers each,
   // waypoint after waypoint. Answers are ordered by waypoint, then by pair. INTERNAL: more
   // waypoints than in the first call.
-  absl::Status Ask(size_t count, const std::vector<double>& poses);
+  absl::Status Query(size_t count, const std::vector<double>& poses);
 
   absl::Status Close();
 

@@ -213,8 +213,8 @@ absl::StatusOr<Scene> ReadRestAsYaml(ByteSource* source, std::string_view first,
   return ParseYaml(*source, first_line, text, form);
 }
 
-// Returns the YAML that replaces a line of the former line format, "place NAME HULL [POSE]",
-// "pair NAME NAME", or "all". Empty for any other line.
+// Returns the YAML that replaces a line of the old line format, "place NAME HULL [POSE]", "pair
+// NAME NAME", or "all". Empty for any other line.
 std::string YamlForLine(std::string_view line) {
   std::vector<std::string> words;
   std::string_view rest = line.substr(0, line.find('#'));

@@ -87,9 +87,9 @@ inline constexpr char kSceneFileHelp[] =
 
 // Reads only the scene at the start of the source: an object in braces up to the end of the line
 // with its last brace, any other YAML up to the end. INVALID_ARGUMENT "NAME:LINE: message",
-// "NAME:LINE:COLUMN: message" for YAML, or "NAME: message" for a request of several lines. A file
-// of the former line format is refused with its YAML equivalent. Opens none of the files named in a
-// YAML scene; 'hullctl scene apply' does.
+// "NAME:LINE:COLUMN: message" for YAML, or "NAME: message" for a request of several lines. The
+// error for a file in the old line format shows its YAML equivalent. Opens none of the files named
+// in a YAML scene; 'hullctl scene apply' does.
 absl::StatusOr<Scene> ReadScene(ByteSource* source, BodyForm form = BodyForm::kWhole);
 
 // Returns the pairs of the scene, two indices each: the named pairs, or all that groups and movers

@@ -202,9 +202,9 @@ v1::PackedPlacements Pack(const std::vector<ViewObject>& from, std::vector<uint3
 }
 
 // Queries the named pairs, or all that the rules select.
-absl::StatusOr<SceneAnswer> AskScene(const Client& client, const v1::FindCollisionsRequest& rules,
-                                     const std::optional<std::vector<uint32_t>>& pairs,
-                                     const std::vector<ViewObject>& objects, double tolerance) {
+absl::StatusOr<SceneAnswer> QueryScene(const Client& client, const v1::FindCollisionsRequest& rules,
+                                       const std::optional<std::vector<uint32_t>>& pairs,
+                                       const std::vector<ViewObject>& objects, double tolerance) {
   std::vector<uint32_t> placed;
   v1::PackedPlacements placements = Pack(objects, &placed);
   SceneAnswer answer(std::move(placed));
@@ -306,14 +306,14 @@ absl::StatusOr<std::string> SceneAnswerJson(const Client& client,
                                             const std::optional<std::vector<uint32_t>>& pairs,
                                             const std::vector<ViewObject>& objects,
                                             double tolerance, uint64_t update) {
-  HULLD_ASSIGN_OR_RETURN(const auto answer, AskScene(client, rules, pairs, objects, tolerance));
+  HULLD_ASSIGN_OR_RETURN(const auto answer, QueryScene(client, rules, pairs, objects, tolerance));
   return answer.Json(update);
 }
 
 absl::StatusOr<bool> AnyCollides(const Client& client, const v1::FindCollisionsRequest& rules,
                                  const std::optional<std::vector<uint32_t>>& pairs,
                                  const std::vector<ViewObject>& objects) {
-  HULLD_ASSIGN_OR_RETURN(const auto answer, AskScene(client, rules, pairs, objects, 0));
+  HULLD_ASSIGN_OR_RETURN(const auto answer, QueryScene(client, rules, pairs, objects, 0));
   return answer.has_pairs();
 }
 
@@ -330,7 +330,7 @@ void AnswerFeed::Show(const ViewScene& scene, uint64_t number) {
   query_.rules = scene.rules;
   query_.pairs = scene.pairs;
   // The page sends a query after it receives the scene.
-  asked_ = false;
+  is_requested_ = false;
 }
 
 void AnswerFeed::AddObjects(const std::vector<ViewObject>& objects, uint64_t scene) {
@@ -339,7 +339,7 @@ void AnswerFeed::AddObjects(const std::vector<ViewObject>& objects, uint64_t sce
   query_.objects.insert(query_.objects.end(), objects.begin(), objects.end());
 }
 
-void AnswerFeed::Ask(const ViewQuery& query) {
+void AnswerFeed::Request(const ViewQuery& query) {
   {
     const std::lock_guard lock(mutex_);
     if (query.scene != scene_) return;
@@ -355,7 +355,7 @@ void AnswerFeed::Ask(const ViewQuery& query) {
     query_.certificate = query.certificate;
     query_.update = query.update;
     query_.rest = query.rest;
-    asked_ = true;
+    is_requested_ = true;
   }
   changed_.notify_all();
 }
@@ -364,7 +364,7 @@ void AnswerFeed::HullsChanged() {
   {
     const std::lock_guard lock(mutex_);
     query_.motion_is_stale = true;
-    asked_ = true;
+    is_requested_ = true;
   }
   changed_.notify_all();
 }
@@ -374,10 +374,10 @@ void AnswerFeed::Run(const std::stop_token& stop) {
     Query query;
     {
       std::unique_lock lock(mutex_);
-      changed_.wait(lock, stop, [this] { return asked_; });
+      changed_.wait(lock, stop, [this] { return is_requested_; });
       if (stop.stop_requested()) return;
       query = query_;
-      asked_ = false;
+      is_requested_ = false;
       query_.motion_is_stale = false;
     }
     if (query.pair && !AnswerPair(query)) return;
@@ -472,16 +472,16 @@ absl::StatusOr<std::string> AnswerFeed::MovingAnswer(const Query& query) {
 
 bool AnswerFeed::AnswerMotion(const Query& query) {
   if (!query.pair) {
-    asked_motion_.clear();
+    queried_motion_.clear();
     return true;
   }
   const ViewObject& a = query.objects[query.pair->first];
   const ViewObject& b = query.objects[query.pair->second];
   const auto request = MotionRequest(a, b, query.certificate);
-  std::string asked =
+  std::string motion =
       request ? absl::StrCat(PairJson(*query.pair), request->SerializeAsString()) : "";
-  const bool is_known = asked == asked_motion_ && !query.motion_is_stale;
-  asked_motion_ = std::move(asked);
+  const bool is_known = motion == queried_motion_ && !query.motion_is_stale;
+  queried_motion_ = std::move(motion);
   if (!request || is_known) return true;
   return page_->SendText(
       MotionAnswerJson(*query.pair, a, b, query.update, client_.CheckCollision(*request)));

@@ -29,7 +29,7 @@ class AnswerFeed {
   // Ignored if they belong to another scene.
   void AddObjects(const std::vector<ViewObject>& objects, uint64_t scene);
   // Ignored if it belongs to another scene.
-  void Ask(const ViewQuery& query);
+  void Request(const ViewQuery& query);
   // Answers the last query again because a hull changed.
   void HullsChanged();
 
@@ -70,14 +70,14 @@ class AnswerFeed {
   v1::HullVersion streamed_version_a_;
   v1::HullVersion streamed_version_b_;
   // The pair and the request of the last query about a motion; empty if there was none.
-  std::string asked_motion_;
+  std::string queried_motion_;
 
   std::mutex mutex_;
   std::condition_variable_any changed_;
   // Guarded by the mutex, like all members below.
   Query query_;
   uint64_t scene_ = 0;
-  bool asked_ = false;
+  bool is_requested_ = false;
   // Stopped and joined first.
   std::jthread thread_;
 };

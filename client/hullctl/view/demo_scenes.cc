@@ -141,7 +141,7 @@ ViewScene BallScene(const std::string& large, const std::string& small) {
 ViewScene GrowingScene(const std::string& live, const std::string& ball) {
   ViewScene scene;
   scene.title = "A live hull grows until it reaches a ball";
-  scene.note = "Points stream into the hull while you look. Show the scene again to start over.";
+  scene.note = "Points stream into the hull while you watch. Show the scene again to start over.";
   scene.objects = {{"live", live, -1, kNoMotion}, {"ball", ball, -1, MovedBy(6, 0, 0)}};
   return scene;
 }
@@ -174,7 +174,7 @@ absl::StatusOr<std::vector<ViewScene>> MakeDemoScenes(const Client& client, Temp
                 spider, spider_shape, spider_touches),
       TwoCopies("Two Wusons that share one vertex", "They touch in exactly one point.", "Wuson",
                 wuson, wuson_shape, wuson_touches),
-      TwoCopies("Two Wusons that overlap by a part in 10\u00b9\u00b2",
+      TwoCopies("Two Wusons that overlap by one part in 10\u00b9\u00b2",
                 "No picture shows it; the certificate proves it.", "Wuson", wuson, wuson_shape,
                 wuson_overlaps),
       CubeScene(cube),

@@ -44,7 +44,7 @@ class GrowingHull {
 };
 
 // Creates the textbook's scenes, also used by client/demo.sh, keys 0 to 7:
-//   0  two Spiders far apart            4  two Wusons that overlap by a part in 10^12
+//   0  two Spiders far apart            4  two Wusons that overlap by one part in 10^12
 //   1  two Spiders that overlap         5  cubes that share a face, an edge and a corner
 //   2  two Spiders that share a vertex  6  two balls, of 3000 and 100 random points
 //   3  two Wusons that share a vertex   7  a hull that grows until it reaches a ball

@@ -54,7 +54,7 @@ void GeometryFeed::Show(const ShapeFiles& files) {
   waiting_.clear();
 }
 
-void GeometryFeed::Ask(const std::vector<ShapeRequest>& shapes) {
+void GeometryFeed::Request(const std::vector<ShapeRequest>& shapes) {
   std::vector<ShapeRequest> refused;
   {
     const std::lock_guard lock(mutex_);

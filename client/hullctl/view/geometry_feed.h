@@ -19,8 +19,8 @@ namespace hulld {
 
 using ShapeFiles = std::vector<std::shared_ptr<const FileShape>>;
 
-// Sends the shapes requested by one page, in order, on its own thread. The destructor waits for the
-// shape in flight, and drops pending requests. Thread-safe.
+// Sends the shapes that a page requests, in order, on its own thread. The destructor waits for the
+// shape being sent and drops the remaining requests. Thread-safe.
 class GeometryFeed {
  public:
   GeometryFeed(const Client& client, std::shared_ptr<PageChannel> page);
@@ -29,7 +29,7 @@ class GeometryFeed {
 
   // Switches to another scene; drops pending requests.
   void Show(const ShapeFiles& files);
-  void Ask(const std::vector<ShapeRequest>& shapes);
+  void Request(const std::vector<ShapeRequest>& shapes);
 
  private:
   void Run(const std::stop_token& stop);

@@ -13,11 +13,11 @@ constexpr std::chrono::seconds kPauseBetweenWatches{1};
 }  // namespace
 
 HullFollower::HullFollower(const Client& client, v1::WatchHullsRequest request, Receiver receive,
-                           Complaint complain)
+                           ReportError report_error)
     : client_(client),
       request_(std::move(request)),
       receive_(std::move(receive)),
-      complain_(std::move(complain)),
+      report_error_(std::move(report_error)),
       thread_([this] {
         Run();
         finished_ = true;
@@ -38,7 +38,7 @@ void HullFollower::Cancel() {
 }
 
 void HullFollower::Run() {
-  std::string last_complaint;
+  std::string last_error;
   while (true) {
     {
       const std::lock_guard lock(mutex_);
@@ -47,7 +47,7 @@ void HullFollower::Run() {
     }
     const absl::Status status = Follow(watch_.get());
     const bool is_unknown = absl::IsUnimplemented(status);
-    const std::string complaint =
+    const std::string error =
         absl::StrCat("Hull changes are currently not shown: ",
                      is_unknown ? "this hulld does not implement WatchHulls" : status.message());
     {
@@ -55,7 +55,7 @@ void HullFollower::Run() {
       if (ended_) return;
     }
     // May block, so it is called without the mutex, which Cancel needs.
-    if (complaint != std::exchange(last_complaint, complaint)) complain_(complaint);
+    if (error != std::exchange(last_error, error)) report_error_(error);
     if (is_unknown) return;
     std::unique_lock lock(mutex_);
     if (changed_.wait_for(lock, kPauseBetweenWatches, [this] { return ended_; })) return;

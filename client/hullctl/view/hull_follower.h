@@ -21,15 +21,15 @@ class HullFollower {
  public:
   // `synced`: the initial state is complete.
   using Receiver = std::function<void(const v1::HullEvent& event, bool synced)>;
-  // Receives the reason why hulls are currently not followed. Recovery is not reported.
-  using Complaint = std::function<void(const std::string& message)>;
+  // Receives the reason that hulls cannot be followed at the moment. Recovery is not reported.
+  using ReportError = std::function<void(const std::string& message)>;
 
   HullFollower(const Client& client, v1::WatchHullsRequest request, Receiver receive,
-               Complaint complain);
+               ReportError report_error);
   // Cancels and waits for the thread, which may be inside the receiver.
   ~HullFollower();
 
-  // Makes the thread end soon; does not wait.
+  // Asks the thread to end; does not wait for it.
   void Cancel();
   // Returns true if the thread has ended, so that the destructor does not wait.
   bool finished() const { return finished_; }
@@ -43,7 +43,7 @@ class HullFollower {
   const Client& client_;
   v1::WatchHullsRequest request_;
   const Receiver receive_;
-  const Complaint complain_;
+  const ReportError report_error_;
   // IDs reported and not deleted, and the subset reported since the watch restarted.
   std::unordered_set<std::string> present_;
   std::unordered_set<std::string> seen_since_restart_;

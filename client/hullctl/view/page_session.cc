@@ -71,9 +71,9 @@ void PageSession::OnMessage(std::string_view json) {
   if (message->show) Show(*message->show);
   if (!message->geometry.empty()) {
     WidenWatch(message->geometry);
-    geometry_.Ask(message->geometry);
+    geometry_.Request(message->geometry);
   }
-  if (message->query) answers_.Ask(*message->query);
+  if (message->query) answers_.Request(*message->query);
   if (message->joints) MoveJoints(*message->joints);
 }
 
@@ -131,7 +131,7 @@ void PageSession::Follow(v1::WatchHullsRequest request) {
   followers_.push_back(std::make_unique<HullFollower>(
       program_.client, watched_,
       [this, number](const v1::HullEvent& event, bool synced) { TakeHull(number, event, synced); },
-      [this](const std::string& complaint) { page_->SendText(ProblemMessage(complaint)); }));
+      [this](const std::string& error) { page_->SendText(ProblemMessage(error)); }));
 }
 
 void PageSession::WidenWatch(const std::vector<ShapeRequest>& shapes) {

@@ -111,8 +111,8 @@ bool IsSceneFile(const std::string& path) {
   while (source.ok() && (*source)->ReadLine(&line)) {
     const std::string_view text = Trim(line);
     if (text.empty() || text.front() == '#') continue;
-    // Lines of the former format are refused with their YAML equivalent.
-    // The colon of ParaView's column Points:0 is no mapping.
+    // Lines of the old format are refused with their YAML equivalent. The colon of ParaView's
+    // column Points:0 is no mapping.
     return text.front() == '{' || text.ends_with(':') ||
            text.find(": ") != std::string_view::npos || text.starts_with("place ");
   }

@@ -92,7 +92,7 @@ struct ViewScene {
   // Without placements.
   v1::FindCollisionsRequest rules;
   // The queried pairs, two indices of objects each, if a scene file or a robot names them. Requires
-  // a hull of every object.
+  // that every object has a hull.
   std::optional<std::vector<uint32_t>> pairs;
   // Empty unless the scene is a robot.
   ViewJoints joints;

@@ -21,8 +21,8 @@ _MAX_UINT64 = 2**64 - 1
 _EXACT_INTEGERS = 2.0**53
 
 
-def number(value: Any, name: str, *, least: float = -math.inf, finite: bool = True) -> float:
-    """The double equal to `value`, at least `least`; never NaN."""
+def number(value: Any, name: str, *, minimum: float = -math.inf, finite: bool = True) -> float:
+    """The double equal to `value`, at least `minimum`; never NaN."""
     if isinstance(value, np.ndarray) and value.ndim == 0 and not _holds_masked(value):
         value = value[()]
     if not _is_real(value):
@@ -40,8 +40,8 @@ def number(value: Any, name: str, *, least: float = -math.inf, finite: bool = Tr
             f"{name} is {value}, which no double represents exactly; convert it explicitly, as "
             "with float()"
         )
-    if double < least:
-        raise ValueError(f"{name} is {value}; it must be at least {least:g}")
+    if double < minimum:
+        raise ValueError(f"{name} is {value}; it must be at least {minimum:g}")
     return double
 
 
@@ -51,7 +51,7 @@ def _is_real(value: Any) -> bool:
 
 def length(value: Any, name: str) -> float:
     """A length of at least 0, possibly infinite."""
-    return number(value, name, least=0, finite=False)
+    return number(value, name, minimum=0, finite=False)
 
 
 def optional_length(value: Any, name: str) -> float | None:
@@ -62,39 +62,39 @@ def seconds(value: Any, name: str = "timeout") -> float | None:
     """A duration of at least 0; None: unbounded."""
     if value is None:
         return None
-    duration = number(value, name, least=0)
+    duration = number(value, name, minimum=0)
     if duration > threading.TIMEOUT_MAX:
         raise ValueError(f"{name} is {value} s; pass None to wait without a limit")
     return duration
 
 
-def count(value: Any, name: str, *, least: int = 0, most: int = _MAX_UINT32) -> int:
-    """An integer from `least` to `most`."""
+def count(value: Any, name: str, *, minimum: int = 0, maximum: int = _MAX_UINT32) -> int:
+    """An integer from `minimum` to `maximum`."""
     if isinstance(value, (bool, np.bool_)):
         raise TypeError(f"{name} is {value!r}; it must be an integer")
     try:
         integer = operator.index(value)
     except TypeError:
         raise TypeError(f"{name} is {value!r}; it must be an integer") from None
-    if not least <= integer <= most:
-        raise ValueError(f"{name} is {integer}; it must be from {least} to {most}")
+    if not minimum <= integer <= maximum:
+        raise ValueError(f"{name} is {integer}; it must be from {minimum} to {maximum}")
     return integer
 
 
-def optional_count(value: Any, name: str, *, least: int = 0) -> int | None:
-    return None if value is None else count(value, name, least=least)
+def optional_count(value: Any, name: str, *, minimum: int = 0) -> int | None:
+    return None if value is None else count(value, name, minimum=minimum)
 
 
 def revision(value: Any, name: str = "if_revision") -> int | None:
     """A revision of the store; None: no condition."""
-    return None if value is None else count(value, name, most=_MAX_UINT64)
+    return None if value is None else count(value, name, maximum=_MAX_UINT64)
 
 
-def text(value: Any, name: str, *, least: int = 0) -> str:
-    """A string of at least `least` characters, and no longer than an ID."""
+def text(value: Any, name: str, *, minimum: int = 0) -> str:
+    """A string of at least `minimum` characters, and no longer than an ID."""
     if not isinstance(value, str):
         raise TypeError(f"{name} is {value!r}; it must be a string")
-    if len(value) < least:
+    if len(value) < minimum:
         raise ValueError(f"{name} is empty")
     if len(value) > _MAX_ID_CHARACTERS:
         raise ValueError(
@@ -112,7 +112,7 @@ def header(value: Any, name: str) -> Any:
     if not (hasattr(value, "store_id") and hasattr(value, "revision")):
         raise TypeError(f"{name} is {value!r}; it must be the header of an answer")
     text(value.store_id, f"{name}.store_id")
-    count(value.revision, f"{name}.revision", most=_MAX_UINT64)
+    count(value.revision, f"{name}.revision", maximum=_MAX_UINT64)
     return value
 
 

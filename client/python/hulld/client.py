@@ -183,7 +183,7 @@ class Client(ClientBase):
         if not is_iterator(points):
             points = as_points(cast(PointsLike, points))
         opening = requests.open_replacement(hull_id, create, if_revision)
-        bytes_of_chunk = arguments.count(chunk_bytes, "chunk_bytes", least=1)
+        bytes_of_chunk = arguments.count(chunk_bytes, "chunk_bytes", minimum=1)
         seconds = arguments.seconds(timeout)
         failure: list[Exception] = []
 
@@ -383,7 +383,7 @@ class Client(ClientBase):
 
         to_a, to_b: end poses of motions (hulld.Placement). The answer then has first_contact, and
         certificate is the only option above that is allowed. max_time_error: the maximum width of
-        its bracket. resolution: allows WITHIN_TOLERANCE if the least separation of a rotating
+        its bracket. resolution: allows WITHIN_TOLERANCE if the smallest separation of a rotating
         motion is at most this.
 
         NotFoundError: no such hull. InvalidArgumentError: incompatible options.
@@ -562,8 +562,8 @@ class Client(ClientBase):
         groups: the group of each placement; with ignore_same_group, pairs within a group are
         skipped, and so are pairs between two groups listed in ignored_group_pairs (k x 2). movers:
         only pairs with at least one of the first `movers` placements. Other arguments are as in
-        check_collisions; with a clearance, all pairs within it are found. limit: returns only the
-        pairs of least separation, at most this many, in ascending order, with their separations;
+        check_collisions; with a clearance, all pairs within it are found. limit: returns at most
+        this many pairs, those with the smallest separation, nearest first, with their separations;
         without a clearance, chosen from all pairs. The totals still count every pair within the
         clearance. Pairs without an answer follow, at most the same number. first_only: returns only
         the pairs in motion that may be the first to touch, in ascending order of separated_until;

@@ -445,15 +445,15 @@ def _judge_motions(
     touches = answered & ~np.isnan(contact)
     said, colliding = table.relations[rows], table.colliding[rows]
     times = table.contact_times[rows]
-    says_contact = ~np.isnan(times) | (colliding == 1) | (said > Relation.SEPARATED)
-    says_none = (colliding == 0) | (said == Relation.SEPARATED)
+    claims_contact = ~np.isnan(times) | (colliding == 1) | (said > Relation.SEPARATED)
+    claims_no_contact = (colliding == 0) | (said == Relation.SEPARATED)
     ends = np.where(touches, contact, 1.0)
     with np.errstate(invalid="ignore"):
         outside = np.maximum(np.maximum(until - times, times - ends), 0.0)
     time_errors = np.where(touches, outside, np.nan)
     faults = np.zeros((len(rows), len(Fault)), bool)
-    faults[:, Fault.MISS] = touches & says_none
-    faults[:, Fault.FALSE_CONTACT] = answered & ~touches & says_contact
+    faults[:, Fault.MISS] = touches & claims_no_contact
+    faults[:, Fault.FALSE_CONTACT] = answered & ~touches & claims_contact
     faults[:, Fault.TIME] = time_errors > max_error
     errors = np.max(
         [

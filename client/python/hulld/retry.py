@@ -23,7 +23,7 @@ class RetryPolicy:
 
     def __post_init__(self) -> None:
         if self.max_attempts is not None:
-            arguments.count(self.max_attempts, "max_attempts", least=1)
+            arguments.count(self.max_attempts, "max_attempts", minimum=1)
         for name in ("initial_backoff", "max_backoff"):
             arguments.seconds(arguments.number(getattr(self, name), name), name)
 

@@ -41,14 +41,14 @@ class HullWatch:
         request: Callable[[Header | None], Call[HullChanges]],
         after: Header | None,
         retry: RetryPolicy,
-        patience: float | None,
+        reconnect_timeout: float | None,
     ) -> None:
         request(after)  # Raises for wrong arguments, before there is a connection.
         self._start = start
         self._request = request
         self._position = WatchPosition(after)
         self._retry = retry
-        self._patience = patience
+        self._reconnect_timeout = reconnect_timeout
         self._call: Any = None
         self._cancelled = False
 
@@ -61,7 +61,7 @@ class HullWatch:
         return self
 
     def __next__(self) -> HullChanges:
-        search = Search(self._retry, self._patience, self._position.connected)
+        search = Search(self._retry, self._reconnect_timeout, self._position.connected)
         while not self._cancelled:
             request = self._request(self._position.after)
             first = self._call is None
@@ -121,14 +121,14 @@ class CollisionWatch:
         metadata: Any,
         watched: WatchedPlacements,
         retry: RetryPolicy,
-        patience: float | None,
+        reconnect_timeout: float | None,
     ) -> None:
         self._call = call
         self._metadata = metadata
         self._watched = watched
         self._reported = ReportedPairs(watched)
         self._retry = retry
-        self._patience = patience
+        self._reconnect_timeout = reconnect_timeout
         # Messages are sent in the order of the pose changes, and a call begins with all of them.
         self._lock = Lock()
         self._connection: Duplex | None = None
@@ -139,7 +139,7 @@ class CollisionWatch:
         return self
 
     def __next__(self) -> CollisionChanges:
-        search = Search(self._retry, self._patience, self._connected)
+        search = Search(self._retry, self._reconnect_timeout, self._connected)
         while not self._cancelled:
             connection = self._open()
             # By another thread, which did not see the connection.

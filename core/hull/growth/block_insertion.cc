@@ -147,12 +147,12 @@ class BlockInsertion {
     std::vector<TriangleId> seen;
     const size_t duplicates = LocateSample(stride, outside, seen);
     if (poll_.stopped()) return true;
-    if (static_cast<double>(duplicates) > kMaxDuplicates * static_cast<double>(asked_)) {
+    if (static_cast<double>(duplicates) > kMaxDuplicates * static_cast<double>(tested_)) {
       rest_ = std::move(outside);
       rest_.insert(rest_.end(), astray_.begin(), astray_.end());
       return false;
     }
-    lists.Take(outside, seen, asked_);
+    lists.Take(outside, seen, tested_);
     return true;
   }
 
@@ -195,7 +195,7 @@ class BlockInsertion {
                            needs_fine_map_ ? kFineMapFineness : kBlockMapFineness,
                            kBlockWalksPerPoint, poll_, needs_fine_map_ ? &cones : nullptr);
     std::vector<Vector> survivors;
-    asked_ = 0;
+    tested_ = 0;
     for (const Range& range : RangesOf(stride)) {
       const std::span<const Vector> points = points_.subspan(range.first, range.end - range.first);
       indices_.clear();
@@ -204,9 +204,9 @@ class BlockInsertion {
       for (const uint32_t i : indices_) {
         if (!IsDone(range.first + i)) survivors.push_back(points[i]);
       }
-      asked_ += points.size();
+      tested_ += points.size();
     }
-    surface_.CountRejected(asked_, asked_ - survivors.size());
+    surface_.CountRejected(tested_, tested_ - survivors.size());
     needs_fine_map_ = survivors.size() > kManyPerTriangle * surface_.triangle_count();
     if (needs_fine_map_ && surface_.MeasureBefore(vertices_, survivors.size(), kFineMapFineness,
                                                   kWalksPerSurvivor, poll_, &cones)) {
@@ -239,7 +239,7 @@ class BlockInsertion {
   // Points to insert in rounds.
   std::vector<Vector> rest_;
   // Number of points of the sample that were looked up in the map.
-  size_t asked_ = 0;
+  size_t tested_ = 0;
   // True if the last sample left many points for each triangle.
   bool needs_fine_map_ = false;
   // Surviving indices among the points being looked up in the map.

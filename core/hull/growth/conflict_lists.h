@@ -84,7 +84,7 @@ class ConflictLists {
   Surface& surface_;
   VertexTable& vertices_;
   StopPoll& poll_;
-  // All lists, with gaps left by former lists.
+  // All lists, with gaps left by removed lists.
   std::unique_ptr<PointBlock[]> blocks_;
   size_t end_ = 0;
   size_t capacity_ = 0;

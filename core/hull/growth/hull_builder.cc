@@ -279,7 +279,7 @@ absl::StatusOr<PointCounts> HullBuilder::Add(std::span<const Vector> points,
   if (!is_done || reached > limits.max_vertices) {
     state_->Undo();
     if (!is_done) {
-      return absl::CancelledError("stopped while adding points; the hull is as before");
+      return absl::CancelledError("adding points was cancelled; the hull is unchanged");
     }
     return absl::ResourceExhaustedError(absl::StrCat(
         "the hull would have ", reached, " vertices; the limit is ", limits.max_vertices));
@@ -317,7 +317,7 @@ Hull HullBuilder::Snapshot() const {
 absl::StatusOr<Hull> HullBuilder::Snapshot(const std::function<bool()>& should_stop) const {
   StopPoll poll(should_stop);
   std::optional<Hull> snapshot = state_->Snapshot(poll);
-  if (!snapshot.has_value()) return absl::CancelledError("stopped while making a snapshot");
+  if (!snapshot.has_value()) return absl::CancelledError("building the snapshot was cancelled");
   return *std::move(snapshot);
 }
 

@@ -35,7 +35,7 @@ struct PointCounts {
   friend bool operator==(const PointCounts&, const PointCounts&) = default;
 };
 
-// Limits of a call of HullBuilder::Add.
+// Limits on a call of HullBuilder::Add.
 struct AddLimits {
   // Maximum number of vertices of the hull after the block.
   size_t max_vertices = std::numeric_limits<size_t>::max();

@@ -82,7 +82,7 @@ __attribute__((target("avx2"))) bool MatchPlanesAvx2(std::span<const PointBlock*
 __attribute__((always_inline)) inline size_t FarthestAlongBody(std::span<const PointBlock> blocks,
                                                                size_t count,
                                                                const Vector& direction) {
-  Lanes most = {-INFINITY, -INFINITY, -INFINITY, -INFINITY};
+  Lanes largest = {-INFINITY, -INFINITY, -INFINITY, -INFINITY};
   Mask farthest = {0, 1, 2, 3};
   Mask index = {0, 1, 2, 3};
   const auto end = static_cast<int64_t>(count);
@@ -94,15 +94,15 @@ __attribute__((always_inline)) inline size_t FarthestAlongBody(std::span<const P
     __builtin_memcpy(&y, block.y, sizeof(y));
     __builtin_memcpy(&z, block.z, sizeof(z));
     const Lanes value = direction.x() * x + direction.y() * y + direction.z() * z;
-    const Mask is_better = (value > most) & (index < end);
-    most = is_better ? value : most;
+    const Mask is_better = (value > largest) & (index < end);
+    largest = is_better ? value : largest;
     farthest = is_better ? index : farthest;
     index += static_cast<int64_t>(PointBlock::kSize);
   }
   size_t best = 0;
   for (size_t lane = 1; lane < PointBlock::kSize; ++lane) {
-    const bool is_earlier = most[lane] == most[best] && farthest[lane] < farthest[best];
-    if (most[lane] > most[best] || is_earlier) best = lane;
+    const bool is_earlier = largest[lane] == largest[best] && farthest[lane] < farthest[best];
+    if (largest[lane] > largest[best] || is_earlier) best = lane;
   }
   return static_cast<size_t>(farthest[best]);
 }

@@ -37,10 +37,10 @@ void InsideOrder::ExtendTo(size_t count) {
   }
 }
 
-size_t InsideOrder::CountFor(double error, size_t most) {
-  HULLD_CHECK(most >= least_);
+size_t InsideOrder::CountFor(double error, size_t max_count) {
+  HULLD_CHECK(max_count >= least_);
   size_t count = least_;
-  while (count < most && !poll_.stopped() && ErrorAt(count) > error) ++count;
+  while (count < max_count && !poll_.stopped() && ErrorAt(count) > error) ++count;
   return count;
 }
 

@@ -25,9 +25,9 @@ class InsideOrder {
 
   // The number of vertices that this order starts with, which is the fewest that it supports.
   size_t least() const { return least_; }
-  // Returns the number of leading vertices that reduce the error to `error`, or `most` if more
+  // Returns the number of leading vertices that reduce the error to `error`, or `max_count` if more
   // would be needed. At least least(). Requires: most >= least().
-  size_t CountFor(double error, size_t most);
+  size_t CountFor(double error, size_t max_count);
   // Returns a **proven** bound, in the caller's length unit, on the distance of any point of the
   // hull from the hull of the first `count` vertices. Requires: least() <= count <= the hull's
   // vertices.

@@ -94,11 +94,11 @@ std::optional<std::vector<uint32_t>> Spreading::Move(std::span<const uint32_t> c
 
 }  // namespace
 
-VertexChoice ChooseInside(const Hull& hull, double max_error, size_t most, StopPoll& poll) {
+VertexChoice ChooseInside(const Hull& hull, double max_error, size_t max_vertices, StopPoll& poll) {
   const UnitScale scale(hull.max_abs_coordinate());
   InsideOrder order(hull, scale, poll);
   if (poll.stopped()) return {};
-  const size_t count = order.CountFor(max_error, most);
+  const size_t count = order.CountFor(max_error, max_vertices);
   VertexChoice choice = {order.First(count), order.ErrorAt(count)};
   // If a large part of the vertices is chosen, there is little to gain.
   if (poll.stopped() || hull.dimension() < 3 || 2 * count > hull.vertices().size()) return choice;

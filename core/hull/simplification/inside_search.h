@@ -10,9 +10,8 @@
 namespace hulld {
 
 // Chooses vertices of a hull of dimension 2 or 3: few for a given error, or a given number for a
-// small error. max_error: in the caller's length unit; 0 means no limit. most: the maximum number
-// of vertices, from dimension + 1 to the hull's number of vertices. If the poll stopped, the result
-// is meaningless.
+// small error. max_error: in the caller's length unit; 0 means no limit. max_vertices: from
+// dimension + 1 to the hull's number of vertices. If the poll stopped, the result is meaningless.
 //
 // Chooses vertices farthest first. For a solid, it then spreads seven eighths of these vertices
 // more evenly and continues farthest first from there, up to three times, as long as this improves
@@ -25,7 +24,7 @@ namespace hulld {
 // nearly equilateral ones, as far as curvature permits, which have the least error for their area.
 // Source: Chen and Xu 2004, Optimal Delaunay Triangulations, for the position of maximum volume;
 // Lloyd 1982, Least Squares Quantization in PCM, for moving all at once.
-VertexChoice ChooseInside(const Hull& hull, double max_error, size_t most, StopPoll& poll);
+VertexChoice ChooseInside(const Hull& hull, double max_error, size_t max_vertices, StopPoll& poll);
 
 }  // namespace hulld
 

@@ -16,13 +16,13 @@ PolygonSubset::PolygonSubset(std::span<const Vector> points, std::span<const uin
   // three vertices form a triangle.
   const auto farthest_from = [&](size_t a, size_t b) {
     size_t farthest = 0;
-    double most = -1;
+    double largest = -1;
     for (size_t place = 0; place < loop_.size() && !poll.Step(); ++place) {
       if (place == a || place == b) continue;
       const double distance = DistanceToTriangleBound(points_[At(a)], points_[At(b)],
                                                       points_[At(b)], points_[At(place)]);
-      if (distance > most) {
-        most = distance;
+      if (distance > largest) {
+        largest = distance;
         farthest = place;
       }
     }

@@ -43,7 +43,7 @@ absl::Status CheckTarget(const SimplifyTarget& target, size_t min_vertices) {
   return absl::OkStatus();
 }
 
-absl::Status Stopped() { return absl::CancelledError("stopped while simplifying"); }
+absl::Status Stopped() { return absl::CancelledError("the simplification was cancelled"); }
 
 // One call of SimplifyOutside, for a hull of dimension 2 or 3.
 class OutsideSearch {
@@ -53,17 +53,18 @@ class OutsideSearch {
         target_(target),
         poll_(poll),
         scale_(hull.max_abs_coordinate()),
-        most_(target.max_vertices == 0 ? hull.vertices().size()
-                                       : std::min(target.max_vertices, hull.vertices().size())),
+        max_vertices_(target.max_vertices == 0
+                          ? hull.vertices().size()
+                          : std::min(target.max_vertices, hull.vertices().size())),
         order_(hull, scale_, poll),
         enclosure_(hull, order_.unit_points(), scale_, target.should_stop, poll) {}
 
   absl::StatusOr<SimplifiedHull> Run() {
     if (!poll_.stopped()) {
-      if (hull_.vertices().size() <= most_) Consider(SimplifiedHull{hull_, 0});
+      if (hull_.vertices().size() <= max_vertices_) Consider(SimplifiedHull{hull_, 0});
       Consider(enclosure_.ByBox());
       if (target_.max_error > 0) Search();
-      if (!best_ || !Reaches(*best_)) TryPushing(most_ / CornersPerVertex());
+      if (!best_ || !Reaches(*best_)) TryPushing(max_vertices_ / CornersPerVertex());
     }
     if (poll_.stopped()) return Stopped();
     // The box is a hull for all finite doubles, with no more vertices than the least permitted
@@ -89,7 +90,7 @@ class OutsideSearch {
 
   // Keeps the hull if it is the best so far. Returns true if it is within both limits.
   bool Consider(std::optional<SimplifiedHull> hull) {
-    if (!hull || poll_.stopped() || hull->hull.vertices().size() > most_) return false;
+    if (!hull || poll_.stopped() || hull->hull.vertices().size() > max_vertices_) return false;
     const bool reaches = Reaches(*hull);
     if (!best_ || IsBetter(*hull, *best_)) best_ = std::move(hull);
     return reaches;
@@ -113,16 +114,17 @@ class OutsideSearch {
   // Pushing a vertex errs by at least the distance it is pushed, about the error of the inside
   // hull. The search starts there, continues in steps, and then bisects.
   void Search() {
-    const size_t worthwhile = best_ && Reaches(*best_) ? best_->hull.vertices().size() : most_;
-    const size_t most = worthwhile / CornersPerVertex();
-    if (most < order_.least()) return;
-    size_t fails = order_.CountFor(target_.max_error, most);
+    const size_t worthwhile =
+        best_ && Reaches(*best_) ? best_->hull.vertices().size() : max_vertices_;
+    const size_t max_vertices = worthwhile / CornersPerVertex();
+    if (max_vertices < order_.least()) return;
+    size_t fails = order_.CountFor(target_.max_error, max_vertices);
     if (TryPushing(fails)) return;
     size_t reaches = fails;
     do {
-      if (reaches == most || poll_.stopped()) return;
+      if (reaches == max_vertices || poll_.stopped()) return;
       fails = reaches;
-      reaches = std::min(most, reaches + reaches / 8 + 1);
+      reaches = std::min(max_vertices, reaches + reaches / 8 + 1);
     } while (!TryPushing(reaches));
     while (reaches - fails > 1 + reaches / 32 && !poll_.stopped()) {
       const size_t middle = fails + (reaches - fails) / 2;
@@ -134,7 +136,7 @@ class OutsideSearch {
   const SimplifyTarget& target_;
   StopPoll& poll_;
   const UnitScale scale_;
-  const size_t most_;
+  const size_t max_vertices_;
   InsideOrder order_;
   Enclosure enclosure_;
   std::optional<SimplifiedHull> best_;
@@ -146,10 +148,11 @@ absl::StatusOr<SimplifiedHull> SimplifyInside(const Hull& hull, const SimplifyTa
   const auto least = static_cast<size_t>(hull.dimension() + 1);
   if (absl::Status s = CheckTarget(target, least); !s.ok()) return s;
   const size_t all = hull.vertices().size();
-  const size_t most = target.max_vertices == 0 ? all : std::min(all, target.max_vertices);
-  if (all <= least || (target.max_error == 0 && all == most)) return SimplifiedHull{hull, 0};
+  const size_t max_vertices = target.max_vertices == 0 ? all : std::min(all, target.max_vertices);
+  if (all <= least || (target.max_error == 0 && all == max_vertices))
+    return SimplifiedHull{hull, 0};
   StopPoll poll(target.should_stop);
-  const VertexChoice choice = ChooseInside(hull, target.max_error, most, poll);
+  const VertexChoice choice = ChooseInside(hull, target.max_error, max_vertices, poll);
   if (poll.stopped()) return Stopped();
   std::optional<Hull> inside = HullOfSubset(hull, choice.vertices, poll);
   if (!inside) return Stopped();

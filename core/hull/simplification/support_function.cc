@@ -82,30 +82,30 @@ void SupportFunction::Build(uint32_t first, uint32_t end, StopPoll& poll) {
 
 uint32_t SupportFunction::FarthestAlong(const Vector& direction, uint32_t start) const {
   uint32_t best = start;
-  double most = points_[best].dot(direction);
+  double max_reach = points_[best].dot(direction);
   for (int climbs = 0; climbs < kMaxClimbs; ++climbs) {
     const uint32_t at = best;
     const std::span<const uint32_t> neighbors = NeighborsOf(at);
     if (neighbors.size() > kMaxNeighbors) break;
     for (const uint32_t next : neighbors) {
-      if (const double reach = points_[next].dot(direction); reach > most) {
-        most = reach;
+      if (const double reach = points_[next].dot(direction); reach > max_reach) {
+        max_reach = reach;
         best = next;
       }
     }
     if (best == at) return best;
   }
-  Search(0, direction, best, most);
+  Search(0, direction, best, max_reach);
   return best;
 }
 
 void SupportFunction::Search(uint32_t at, const Vector& direction, uint32_t& best,
-                             double& most) const {
+                             double& max_reach) const {
   const Node& node = nodes_[at];
   if (node.second_half == 0) {
     for (uint32_t i = node.first; i < node.end; ++i) {
-      if (const double reach = points_[order_[i]].dot(direction); reach > most) {
-        most = reach;
+      if (const double reach = points_[order_[i]].dot(direction); reach > max_reach) {
+        max_reach = reach;
         best = order_[i];
       }
     }
@@ -122,7 +122,7 @@ void SupportFunction::Search(uint32_t at, const Vector& direction, uint32_t& bes
     std::swap(reaches[0], reaches[1]);
   }
   for (size_t k = 0; k < 2; ++k) {
-    if (reaches[k] > most) Search(halves[k], direction, best, most);
+    if (reaches[k] > max_reach) Search(halves[k], direction, best, max_reach);
   }
 }
 

@@ -50,7 +50,7 @@ class SupportFunction {
   }
   void Link(const Hull& hull, StopPoll& poll);
   void Build(uint32_t first, uint32_t end, StopPoll& poll);
-  void Search(uint32_t at, const Vector& direction, uint32_t& best, double& most) const;
+  void Search(uint32_t at, const Vector& direction, uint32_t& best, double& max_reach) const;
 
   std::span<const Vector> points_;
   // Adjacent vertices, by vertex.

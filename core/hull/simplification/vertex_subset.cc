@@ -19,14 +19,14 @@ template <size_t n, typename Measure>
 uint32_t Farthest(std::span<const uint32_t> candidates, const std::array<uint32_t, n>& excluded,
                   StopPoll& poll, Measure&& measure) {
   uint32_t best = candidates[0];
-  double most = -1;
+  double largest = -1;
   for (const uint32_t i : candidates) {
     if (poll.Step()) break;
     bool is_excluded = false;
     for (const uint32_t other : excluded) is_excluded |= i == other;
     if (is_excluded) continue;
-    if (const double value = measure(i); value > most) {
-      most = value;
+    if (const double value = measure(i); value > largest) {
+      largest = value;
       best = i;
     }
   }
@@ -164,10 +164,10 @@ double VertexSubset::DistanceTo(TriangleId id, uint32_t point) const {
 // that it sees strictly. Requires: it sees a target, for the reason given at ConflictLists.
 void VertexSubset::Assign(uint32_t point, std::span<const TriangleId> targets) {
   TriangleId best = targets[0];
-  double most = HeightOver(best, point);
+  double largest = HeightOver(best, point);
   for (const TriangleId id : targets.subspan(1)) {
-    if (const double height = HeightOver(id, point); height > most) {
-      most = height;
+    if (const double height = HeightOver(id, point); height > largest) {
+      largest = height;
       best = id;
     }
   }

@@ -147,7 +147,7 @@ void Surface::StartJournal() {
   before_.Start({.alive = alive_,
                  .extent = extent_,
                  .next_update = next_update_,
-                 .asked = asked_,
+                 .tested = tested_,
                  .rejected = rejected_,
                  .measured_at = measured_at_,
                  .joined = joined_,
@@ -167,7 +167,7 @@ void Surface::Undo() {
   alive_ = before_->alive;
   extent_ = before_->extent;
   next_update_ = before_->next_update;
-  asked_ = before_->asked;
+  tested_ = before_->tested;
   rejected_ = before_->rejected;
   measured_at_ = before_->measured_at;
   joined_ = before_->joined;

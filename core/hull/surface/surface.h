@@ -76,7 +76,7 @@ class Surface {
     size_t cell = 0;
     if (directions_) {
       const DirectionMap::Place place = directions_->PlaceOf(point);
-      ++asked_;
+      ++tested_;
       if (directions_->IsCertainlyInside(place)) {
         ++rejected_;
         return;
@@ -170,12 +170,12 @@ class Surface {
   // than the surface has triangles.
   bool MeasureBefore(const VertexTable& vertices, size_t points, double fineness,
                      double walks_per_point, StopPoll& poll, TriangleCones* cones);
-  // False if the map rejected too few of the points looked up since the last measurement.
-  bool IsMapWorthwhile() const { return 8 * rejected_ >= asked_; }
+  // Returns false if the map rejected too few of the points looked up since the last measurement.
+  bool IsMapWorthwhile() const { return 8 * rejected_ >= tested_; }
   // Records the number of points looked up in the map and rejected by it, as a measure of its
   // value.
-  void CountRejected(size_t asked, size_t rejected) {
-    asked_ += asked;
+  void CountRejected(size_t tested, size_t rejected) {
+    tested_ += tested;
     rejected_ += rejected;
   }
 
@@ -278,13 +278,13 @@ class Surface {
   Location SeenNear(TriangleId id, const Vector& point, double size) const {
     const SurfaceTriangle& t = triangles_[id];
     TriangleId best = id;
-    double most = HeightAbove(t, point, size);
+    double largest = HeightAbove(t, point, size);
     for (const TriangleId next : t.neighbors) {
       const double height = HeightAbove(triangles_[next], point, size);
-      best = height > most ? next : best;
-      most = std::max(most, height);
+      best = height > largest ? next : best;
+      largest = std::max(largest, height);
     }
-    return {most > 0 ? Side::kOutside : Side::kUnknown, best};
+    return {largest > 0 ? Side::kOutside : Side::kUnknown, best};
   }
   // Returns the point's height above the triangle's plane, times the length of its normal, if that
   // is certainly above zero; otherwise zero.
@@ -339,7 +339,7 @@ class Surface {
     size_t alive;
     double extent;
     size_t next_update;
-    size_t asked;
+    size_t tested;
     size_t rejected;
     size_t measured_at;
     size_t joined;
@@ -368,7 +368,7 @@ class Surface {
   size_t next_update_ = 0;
   // Number of points looked up in the map since the last measurement, and number of these that it
   // rejected.
-  size_t asked_ = 0;
+  size_t tested_ = 0;
   size_t rejected_ = 0;
   // Number of triangles at the last measurement.
   size_t measured_at_ = 0;

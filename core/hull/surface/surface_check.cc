@@ -12,7 +12,7 @@ namespace {
 // Checks that the corners are three live vertices that span a plane.
 const char* FindCornerDefect(const VertexTable& vertices, const SurfaceTriangle& t) {
   for (const VertexId v : t.corners) {
-    if (!vertices.IsAlive(v)) return "a corner is no vertex";
+    if (!vertices.IsAlive(v)) return "a corner is not a vertex";
   }
   const auto& [a, b, c] = t.corners;
   if (ProjectionOf(vertices[a], vertices[b], vertices[c]).first < 0) {

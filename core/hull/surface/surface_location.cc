@@ -279,7 +279,7 @@ bool Surface::MeasureBefore(const VertexTable& vertices, size_t points, double f
 void Surface::StartMeasuring(int resolution) {
   measured_at_ = alive_;
   joined_ = 0;
-  asked_ = 0;
+  tested_ = 0;
   rejected_ = 0;
   const size_t row = static_cast<size_t>(resolution) + 1;
   work_ += row;

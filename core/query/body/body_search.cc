@@ -134,7 +134,7 @@ BodySearch::BodySearch(const PlacedBody& a, const PlacedBody& b, const QueryOpti
 
 absl::StatusOr<bool> BodySearch::Advance(uint64_t steps) {
   for (; steps > 0 && !ended_; --steps) {
-    if (poll_.Step()) return absl::CancelledError("stopped in a query of bodies");
+    if (poll_.Step()) return absl::CancelledError("the query was cancelled");
     if (absl::Status s = found_ ? Prove() : Search(); !s.ok()) return s;
     ended_ = found_ && (!options_->want_certificate || (certification_ && certification_->ended()));
   }
@@ -146,7 +146,7 @@ absl::Status BodySearch::Search() {
   if (!candidates_.empty()) {
     const Candidate candidate = candidates_.back();
     candidates_.pop_back();
-    if (candidate.gap <= Limit()) return Ask(candidate);
+    if (candidate.gap <= Limit()) return Query(candidate);
   } else if (!waiting_.empty()) {
     const Nodes nodes = waiting_.back();
     waiting_.pop_back();
@@ -215,7 +215,7 @@ void BodySearch::EnterLeaves(const Nodes& nodes) {
   });
 }
 
-absl::Status BodySearch::Ask(const Candidate& candidate) {
+absl::Status BodySearch::Query(const Candidate& candidate) {
   const PlacedHull& x = leaf_x_.At(*x_, candidate.slot_x, candidate.piece_x);
   const PlacedHull& y = leaf_y_.At(*y_, candidate.slot_y, candidate.piece_y);
   const bool swapped = x_ != a_;
@@ -291,13 +291,14 @@ absl::StatusOr<BodyAnswer> BodySearch::TakeLeast() const {
   absl::StatusOr<Answer> answer = CheckCollision(a.placed(), b.placed(), OfDecidingPair(*options_));
   if (!answer.ok()) return answer.status();
   BodyAnswer result = {{decided_, {}}, *std::move(answer)};
-  // Signs of separations are exact, so the least separation has the sign of the strongest relation.
+  // Signs of separations are exact, so the smallest separation has the sign of the strongest
+  // relation.
   HULLD_CHECK(result.answer.relation == relation_);
   result.answer.rung = rung_;
   if (options_->clearance) result.answer.within_clearance = within_clearance_;
   if (!result.answer.separation || relation_ == Relation::kTouching) return result;
   Separation& separation = *result.answer.separation;
-  // Another pair with smaller bounds may have the least separation.
+  // Another pair with smaller bounds may have the smallest separation.
   const double bound = std::max(separation.value - min_low_, min_high_ - separation.value);
   if (bound > separation.bound) separation.bound = std::nextafter(bound, kInfinity);
   return result;

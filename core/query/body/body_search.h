@@ -43,14 +43,14 @@ struct BodyCounts {
 
 // Finds the relation and separation of two bodies. The relation is the strongest over all pairs of
 // a piece of A and a piece of B, in the order OVERLAPPING, WITHIN_TOLERANCE, TOUCHING, SEPARATED.
-// The separation is the least over all pairs: the distance of the nearest pair, or minus the depth
-// of the deepest. Each pair is decided like two hulls, at the exact products of the poses.
+// The separation is the smallest over all pairs: the distance of the nearest pair, or minus the
+// depth of the deepest. Each pair is decided like two hulls, at the exact products of the poses.
 //
 // The search descends two box trees simultaneously, nearest boxes first. If only the relation and
 // the clearance are requested, it stops when both are known, and names the pair that decided the
 // relation or, if no pair collides, the clearance. While only one of them is unknown, it skips all
 // pairs that cannot change it, so it never visits more boxes and pairs than a search for the
-// separation. If further details are requested, it names the pair with the least separation.
+// separation. If further details are requested, it names the pair with the smallest separation.
 // Swapping A and B mirrors the answer, and the named pair does not depend on threads.
 //
 // Certificates do not count among these details. If requested, the certificates of pieces that
@@ -109,7 +109,7 @@ class BodySearch {
   void EnterLeaves(const Nodes& nodes);
   absl::Status Search();
   absl::Status Prove();
-  absl::Status Ask(const Candidate& candidate);
+  absl::Status Query(const Candidate& candidate);
   void TakeUp(const Answer& answer, PiecePair pieces);
   void TakeUpSeparation(const Answer& answer, PiecePair pieces);
   absl::StatusOr<BodyAnswer> TakeLeast() const;
@@ -142,7 +142,7 @@ class BodySearch {
   Rung rung_ = Rung::kBounds;
   bool within_clearance_ = false;
   std::optional<PiecePair> decided_;
-  // The least separation found, and bounds on the least separation of all pairs found.
+  // The smallest separation found, and bounds on the smallest separation of all pairs found.
   double min_value_ = std::numeric_limits<double>::infinity();
   double min_low_ = std::numeric_limits<double>::infinity();
   double min_high_ = std::numeric_limits<double>::infinity();

@@ -26,7 +26,7 @@ PieceCertification::PieceCertification(const PlacedBody& a, const PlacedBody& b,
     : a_(&a),
       b_(&b),
       each_(CertificateOptions(options)),
-      most_(options.max_piece_certificates),
+      max_certificates_(options.max_piece_certificates),
       relation_(relation) {
   HULLD_CHECK(relation != Relation::kWithinTolerance);
   if (relation == Relation::kOverlapping) {
@@ -87,11 +87,11 @@ absl::Status PieceCertification::FindPairs(uint32_t piece_a) {
     if (b_->body().pieces()[piece_b].hull->empty()) continue;
     pairs_.push_back({piece_a, piece_b});
   }
-  if (pairs_.size() <= most_) return absl::OkStatus();
+  if (pairs_.size() <= max_certificates_) return absl::OkStatus();
   return absl::ResourceExhaustedError(
-      absl::StrCat("more than ", most_,
-                   " pairs of pieces are so close that each needs a certificate; use bodies of "
-                   "fewer pieces, or ask without certificates"));
+      absl::StrCat("more than ", max_certificates_,
+                   " pairs of pieces are so close that each needs a certificate; use bodies with "
+                   "fewer pieces, or do not request certificates"));
 }
 
 absl::Status PieceCertification::Certify(PiecePair pieces) {

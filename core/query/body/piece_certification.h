@@ -61,7 +61,7 @@ class PieceCertification {
   const PlacedBody* b_;
   // Options for each pair.
   QueryOptions each_;
-  uint64_t most_;
+  uint64_t max_certificates_;
   Relation relation_;
   Relation strongest_ = Relation::kSeparated;
 

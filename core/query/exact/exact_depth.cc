@@ -70,7 +70,7 @@ class ExactExpansion {
   }
 
  private:
-  static absl::Status Stopped() { return absl::CancelledError("stopped in an exact query"); }
+  static absl::Status Stopped() { return absl::CancelledError("the exact query was cancelled"); }
 
   // Approximate memory of the growing polytope, in bytes.
   size_t MemoryBytes() const {

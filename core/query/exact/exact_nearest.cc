@@ -138,7 +138,7 @@ absl::StatusOr<ExactNearest> FindNearestExactly(ExactPair& pair, std::span<const
   if (corners.empty()) corners.push_back(pair.Corner({0, 0}));
   StopPoll poll(should_stop, 1);
   for (;;) {
-    if (poll.Step()) return absl::CancelledError("stopped in an exact query");
+    if (poll.Step()) return absl::CancelledError("the exact query was cancelled");
     SimplexFace part = NearestPart(corners);
     const IntegerVector& n = part.toward_origin;
     if (!IsZero(n)) {
@@ -146,7 +146,7 @@ absl::StatusOr<ExactNearest> FindNearestExactly(ExactPair& pair, std::span<const
       if (half != nullptr) {
         farthest.w = Sign(Dot(n, *half)) < 0 ? farthest.w - *half : farthest.w + *half;
       }
-      if (pair.stopped()) return absl::CancelledError("stopped in an exact query");
+      if (pair.stopped()) return absl::CancelledError("the exact query was cancelled");
       if (Dot(n, farthest.w) > Dot(n, part.corners[0].w)) {
         corners = std::move(part.corners);
         corners.push_back(std::move(farthest));

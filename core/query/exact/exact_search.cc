@@ -102,7 +102,7 @@ class Search {
   using Number = typename Pair::Number;
   using PortalResult = typename PortalSearch<Pair>::Result;
 
-  static absl::Status Stopped() { return absl::CancelledError("stopped in an exact query"); }
+  static absl::Status Stopped() { return absl::CancelledError("the exact query was cancelled"); }
 
   template <typename Axis>
   ExactSearchResult Found(Relation relation, const Axis& axis, uint64_t directions_tried) const {
@@ -192,7 +192,7 @@ template <int kWords>
     const FloatPair& pair, const SmallFrame& frame, const FloatSearchResult* end, bool with_axis,
     const std::function<bool()>& should_stop) {
   if (!WidePair<kWords>::Fits(frame)) {
-    return absl::FailedPreconditionError("numbers of this pair may exceed the width");
+    return absl::FailedPreconditionError("the numbers of this pair may not fit this width");
   }
   WidePair<kWords> wide(pair, frame, should_stop);
   return Search<WidePair<kWords>>(wide, with_axis, should_stop).Run(end);

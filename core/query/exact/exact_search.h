@@ -41,7 +41,7 @@ enum class ExactWidth {
 // Decides the relation of two non-empty hulls exactly. `end`: the final state of a floating-point
 // search without a verdict, which usually shows the relation at once; may be null. `with_axis`:
 // requests the axis, at the cost of its conversion to integers of any size. `width`, for tests:
-// FAILED_PRECONDITION if the pair's numbers may exceed it. CANCELLED: should_stop, which may be
+// FAILED_PRECONDITION if the pair's numbers may not fit it. CANCELLED: should_stop, which may be
 // empty, returned true.
 //
 // A flat Minkowski difference C, of dimension below 3, has no interior. Either its plane or line

@@ -52,10 +52,9 @@ bool IsOnLattice(const FloatPair& pair) {
 // origin in the triangle's plane.
 bool ContainsOrigin(const Vector& p, const Vector& q, const Vector& r, CoordinatePlane plane) {
   const Vector origin = Vector::Zero();
-  const auto [least, most] =
-      std::minmax({Orient2d(p, q, origin, plane), Orient2d(q, r, origin, plane),
-                   Orient2d(r, p, origin, plane)});
-  return (least >= 0 && most > 0) || (most <= 0 && least < 0);
+  const auto [min, max] = std::minmax({Orient2d(p, q, origin, plane), Orient2d(q, r, origin, plane),
+                                       Orient2d(r, p, origin, plane)});
+  return (min >= 0 && max > 0) || (max <= 0 && min < 0);
 }
 
 // Returns true if vertex i is farther than all others.

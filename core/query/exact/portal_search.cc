@@ -357,14 +357,14 @@ std::optional<typename PortalSearch<Pair>::Result> PortalSearch<Pair>::TryTriang
     // in which the normal is not zero gives their signs.
     int axis = 0;
     while (normal[axis].is_zero()) ++axis;
-    int least = 1;
-    int most = -1;
+    int min = 1;
+    int max = -1;
     for (const auto& [u, v] : {std::pair{&q, &r}, {&r, &p}, {&p, &q}}) {
       const int sign = Sign(Cross(Exact(*u), Exact(*v))[axis]);
-      least = std::min(least, sign);
-      most = std::max(most, sign);
+      min = std::min(min, sign);
+      max = std::max(max, sign);
     }
-    holds = least >= 0 || most <= 0;
+    holds = min >= 0 || max <= 0;
   }
   return Judge(n, holds ? std::array{&p, &q, &r} : std::array<const Point*, 3>{});
 }
@@ -375,10 +375,10 @@ std::optional<typename PortalSearch<Pair>::Result> PortalSearch<Pair>::TryTetrah
   const auto& [p, q, r, s] = corners;
   // The origin's coordinates: the weight of each corner, up to a common factor.
   const int weights[4] = {-Sign3(r, s, q), Sign3(r, s, p), -Sign3(p, q, s), Sign3(p, q, r)};
-  const auto [least, most] = std::minmax_element(weights, weights + 4);
-  if (*least * *most > 0) return Result{Verdict::kOverlapping, {}, {}};
+  const auto [min, max] = std::minmax_element(weights, weights + 4);
+  if (*min * *max > 0) return Result{Verdict::kOverlapping, {}, {}};
   // Outside, or flat.
-  if (*least == *most || (*least < 0 && *most > 0)) return std::nullopt;
+  if (*min == *max || (*min < 0 && *max > 0)) return std::nullopt;
   for (int i = 0; i < 4; ++i) {
     if (weights[i] != 0) continue;
     // The origin is on the face opposite to corner i.

@@ -165,8 +165,8 @@ bool CrossesInside(const FloatPair& start, const RelativePath& path,
   const double position_error = kMinkowskiErrorFactor * start.size();
   const double bound = kDifferencesErrorFactor * largest * largest * position_error;
   const auto turn = [&](int i, int j) { return Dot(d, Cross(corners[i], corners[j])); };
-  const auto [least, most] = std::minmax({turn(0, 1), turn(1, 2), turn(2, 0)});
-  return least > bound || most < -bound;
+  const auto [min, max] = std::minmax({turn(0, 1), turn(1, 2), turn(2, 0)});
+  return min > bound || max < -bound;
 }
 
 // True if all vertices that may be farthest belong to the facet.

@@ -287,10 +287,11 @@ class Expansion {
 
   // Returns the least n . p over the corners of facets that may be within the upper bound.
   double LowAlong(const PlainVector& n) const {
-    const double most = (bounds_.high + kTriangleDistanceErrorFactor * pair_.size()) * per_unit_;
+    const double max_distance =
+        (bounds_.high + kTriangleDistanceErrorFactor * pair_.size()) * per_unit_;
     double low = INFINITY;
     for (uint32_t i = 0; i < planes_.size(); ++i) {
-      if (!surface_.facets()[i].alive || planes_[i].distance > most) continue;
+      if (!surface_.facets()[i].alive || planes_[i].distance > max_distance) continue;
       for (const uint32_t corner : surface_.facets()[i].corners) {
         low = std::min(low, Dot(n, corners_[corner].w));
       }

@@ -173,7 +173,7 @@ absl::Status MovingBodySearch::EnterCertificates() {
       absl::StrCat("each of ", pieces_a_.size() * pieces_b_.size(),
                    " pairs of pieces in motion needs a certificate, but at most ",
                    options_->max_piece_certificates,
-                   " are given; use bodies of fewer pieces, or ask without certificates"));
+                   " are allowed; use bodies with fewer pieces, or do not request certificates"));
 }
 
 // Proves one pair of pieces.

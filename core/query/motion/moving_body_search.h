@@ -51,7 +51,7 @@ class MovingBodySearch {
   MovingBodySearch& operator=(const MovingBodySearch&) = delete;
 
   // Advances by at most `steps` steps, each for one pair of pieces. Returns true if the search has
-  // ended. CANCELLED: should_stop returned true. INVALID_ARGUMENT: as FindFirstContact.
+  // ended. CANCELLED: should_stop returned true. INVALID_ARGUMENT: see FindFirstContact.
   // RESOURCE_EXHAUSTED: more pairs of pieces than max_piece_certificates need a certificate.
   absl::StatusOr<bool> Advance(uint64_t steps);
   // Requires: the search has ended. Call at most once.
@@ -106,7 +106,7 @@ class MovingBodySearch {
   BodyContact result_;
 };
 
-// Runs a complete search. INVALID_ARGUMENT: ValidateMotionOptions. Otherwise as
+// Runs a complete search. INVALID_ARGUMENT: see ValidateMotionOptions. Other errors: see
 // MovingBodySearch::Advance.
 absl::StatusOr<BodyContact> FindFirstContact(const MovingBody& a, const MovingBody& b,
                                              const MotionOptions& options = {});

@@ -63,12 +63,12 @@ using Pair = double __attribute__((vector_size(16)));
 // Returns the largest n.v over the points for each direction, with the same bits as SupportValue.
 std::array<double, 1> ScanAlong(std::span<const Vector> points,
                                 const std::array<PlainVector, 1>& n) {
-  double most = -kInfinity;
+  double largest = -kInfinity;
   for (const Vector& v : points) {
     const double value = (n[0].x * v.x() + n[0].y * v.y()) + n[0].z * v.z();
-    most = value > most ? value : most;
+    largest = value > largest ? value : largest;
   }
-  return {most};
+  return {largest};
 }
 template <size_t kCount>
 std::array<double, kCount> ScanAlong(std::span<const Vector> points,
@@ -77,23 +77,23 @@ std::array<double, kCount> ScanAlong(std::span<const Vector> points,
   Pair x[kPairs];
   Pair y[kPairs];
   Pair z[kPairs];
-  Pair most[kPairs];
+  Pair largest[kPairs];
   for (size_t i = 0; i < kPairs; ++i) {
     const PlainVector& n0 = n[2 * i];
     const PlainVector& n1 = n[std::min(2 * i + 1, kCount - 1)];
     x[i] = Pair{n0.x, n1.x};
     y[i] = Pair{n0.y, n1.y};
     z[i] = Pair{n0.z, n1.z};
-    most[i] = Pair{-kInfinity, -kInfinity};
+    largest[i] = Pair{-kInfinity, -kInfinity};
   }
   for (const Vector& v : points) {
     for (size_t i = 0; i < kPairs; ++i) {
       const Pair value = (x[i] * v.x() + y[i] * v.y()) + z[i] * v.z();
-      most[i] = value > most[i] ? value : most[i];
+      largest[i] = value > largest[i] ? value : largest[i];
     }
   }
   std::array<double, kCount> result;
-  for (size_t i = 0; i < kCount; ++i) result[i] = most[i / 2][i % 2];
+  for (size_t i = 0; i < kCount; ++i) result[i] = largest[i / 2][i % 2];
   return result;
 }
 
@@ -150,19 +150,19 @@ class MovingPlane::Bounds {
   double weight() const { return weight_; }
   // Returns the maximum reach of the hull along n at the start and at the end.
   std::array<double, 2> Reach() const {
-    return {most_[0] * inverse_weights_[0], most_[4] * inverse_weights_[4]};
+    return {largest_[0] * inverse_weights_[0], largest_[4] * inverse_weights_[4]};
   }
-  // Returns the maximum coefficient of `most_` minus the offsets at both ends, divided by the
+  // Returns the maximum coefficient of `largest_` minus the offsets at both ends, divided by the
   // weights.
   double HeightOver(double offset, double end_offset) const {
     const Quartic offsets = Product(norms_, Elevated(offset, end_offset));
     double height = -kInfinity;
     for (int i = 0; i < 5; ++i)
-      height = std::max(height, (most_[i] - offsets[i]) * inverse_weights_[i]);
+      height = std::max(height, (largest_[i] - offsets[i]) * inverse_weights_[i]);
     return height;
   }
-  // Returns the error bound of `most_` minus offsets. `sizes`: sum of the magnitudes of the terms
-  // of the offsets.
+  // Returns the error bound of `largest_` minus offsets. `sizes`: sum of the magnitudes of the
+  // terms of the offsets.
   double ErrorWith(double sizes) const {
     return error_ + kMotionPlaneErrorFactor * weight_ * sizes;
   }
@@ -171,7 +171,7 @@ class MovingPlane::Bounds {
     const Quartic offsets = Product(norms_, Elevated(offset, end_offset));
     const double all = ErrorWith(sizes);
     bool below = true;
-    for (int i = 0; i < 5; ++i) below = below && most_[i] + all < offsets[i];
+    for (int i = 0; i < 5; ++i) below = below && largest_[i] + all < offsets[i];
     return below;
   }
 
@@ -191,8 +191,8 @@ class MovingPlane::Bounds {
   // Coefficients of |q|^2 n.x.
   Quartic moved_;
   // Maximum of each coefficient of |q|^2 n.p over all vertices.
-  Quartic most_;
-  // Error bound of `most_`, without that of the offsets.
+  Quartic largest_;
+  // Error bound of `largest_`, without that of the offsets.
   double error_ = 0;
   bool usable_ = false;
 };
@@ -333,11 +333,11 @@ MovingPlane::Bounds::Bounds(Side& side, const PlainVector& n0, const PlainVector
   const double factor = side.piece ? kPiecePlaneErrorFactor : kMotionPlaneErrorFactor;
   const double largest = std::max(LargestComponent(n0), LargestComponent(n1));
   error_ = factor * weight_ * largest * std::max(side.size, kMotionMinSize);
-  most_[0] = TurnedReach(side, start_, n0) + moved_[0];
+  largest_[0] = TurnedReach(side, start_, n0) + moved_[0];
   if (turns_ || !is_fixed) {
-    most_[4] = TurnedReach(side, end_, n1) + moved_[4];
+    largest_[4] = TurnedReach(side, end_, n1) + moved_[4];
   } else {
-    most_.fill(most_[0]);
+    largest_.fill(largest_[0]);
   }
 }
 
@@ -345,7 +345,7 @@ void MovingPlane::Bounds::AddMiddle() {
   if (start_.time == end_.time) {
     // Each vertex has a linear polynomial. The error of a mean of two values is below that of a
     // mean of six directions, which kMotionPlaneErrorFactor includes.
-    for (int i = 1; i < 4; ++i) most_[i] = 0.25 * ((4 - i) * most_[0] + i * most_[4]);
+    for (int i = 1; i < 4; ++i) largest_[i] = 0.25 * ((4 - i) * largest_[0] + i * largest_[4]);
     return;
   }
   const Quaternion& q0 = start_.q;
@@ -361,7 +361,7 @@ void MovingPlane::Bounds::AddMiddle() {
       HullReach<3>(side_, {0.25 * (first + first_1) + 0.5 * middle,
                            1.0 / 6 * (first_1 + 2 * (middle + middle_1) + last),
                            0.5 * middle_1 + 0.25 * (last + last_1)});
-  for (int i = 0; i < 3; ++i) most_[i + 1] = reach[i] + moved_[i + 1];
+  for (int i = 0; i < 3; ++i) largest_[i + 1] = reach[i] + moved_[i + 1];
 }
 
 bool MovingPlane::IsUsableAt(double time) {

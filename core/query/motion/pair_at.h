@@ -76,7 +76,9 @@ class RoundedPair {
 };
 
 // Returns the error of a search that was stopped by should_stop.
-inline absl::Status MotionStopped() { return absl::CancelledError("stopped in a motion"); }
+inline absl::Status MotionStopped() {
+  return absl::CancelledError("the search for the first contact was cancelled");
+}
 
 }  // namespace hulld
 

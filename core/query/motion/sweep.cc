@@ -83,7 +83,7 @@ absl::StatusOr<SweptRelation> FindSweptRelation(ExactPair& middle, const Integer
     case PortalSearch<ExactPair>::Verdict::kStopped:
       break;
   }
-  return absl::CancelledError("stopped in an exact query");
+  return absl::CancelledError("the exact query was cancelled");
 }
 
 }  // namespace hulld

@@ -165,9 +165,9 @@ absl::Status TranslationSearch::TryFacet() {
   const IntegerVector of_b = ToInteger(end_b, exponent) - ToInteger(b_.X_WB.start.t, exponent);
   const IntegerVector d = pair.norm() * (of_b - of_a);
   // The sides of the path on which the edges pass.
-  const auto [least, most] = std::minmax(
+  const auto [min, max] = std::minmax(
       {SignOfDeterminant(d, p, q), SignOfDeterminant(d, q, r), SignOfDeterminant(d, r, p)});
-  if (least < 0 && most > 0) return absl::OkStatus();
+  if (min < 0 && max > 0) return absl::OkStatus();
   IntegerVector n = Cross(q - p, r - p);
   Integer speed = Dot(n, d);
   if (Sign(speed) > 0) {
@@ -181,7 +181,7 @@ absl::Status TranslationSearch::TryFacet() {
   if (!is_facet || Sign(reach) > 0) return absl::OkStatus();
   const FloorTime entry = RoundDown(-reach << shift, -speed);
   if (entry.value == 1) return absl::OkStatus();
-  const bool is_inside = least * most != 0 && SpanOf(pair).dimension == 3;
+  const bool is_inside = min * max != 0 && SpanOf(pair).dimension == 3;
   TakeEntry(entry.value, entry.exact ? entry.value : std::nextafter(entry.value, 1.0),
             is_inside ? Relation::kOverlapping : Relation::kTouching);
   if (options_.want_certificate && entry.exact) {

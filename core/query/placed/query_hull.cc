@@ -27,7 +27,7 @@ absl::StatusOr<QueryHull> QueryHull::Prepare(const Hull& hull,
                                              const std::function<bool()>& should_stop) {
   QueryHull prepared(hull, should_stop);
   if (!prepared.empty() && prepared.base_->support().stopped()) {
-    return absl::CancelledError("stopped while a hull was prepared for queries");
+    return absl::CancelledError("preparing the hull was cancelled");
   }
   return prepared;
 }

@@ -32,7 +32,7 @@ class SupportTree {
   // have about the largest value.
   SupportPoint Farthest(std::span<const Vector> points, const PlainVector& n) const;
   // Calls visit(i) for each point with a computed value of at least `least`, in no particular
-  // order, until it returns false. Returns false if it did. Requires: as Farthest.
+  // order, until `visit` returns false. Returns false if `visit` did. Requires: see Farthest.
   template <typename Visit>
   bool ForEachAtLeast(std::span<const Vector> points, const PlainVector& n, double least,
                       Visit&& visit) const;

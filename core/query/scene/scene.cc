@@ -58,10 +58,11 @@ class Search {
       for (uint32_t i = 0; i < size && !Stopped(); ++i) {
         while (const std::optional<uint32_t> b = window[i].Next()) {
           pairs_.push_back({begin + i, *b});
-          if (pairs_.size() == kMaxEmittedAnswers && !AskAndEmit(emit)) break;
+          if (pairs_.size() == kMaxEmittedAnswers && !QueryAndEmit(emit)) break;
         }
       }
-      if (Stopped() || !AskAndEmit(emit)) return absl::CancelledError("stopped in a scene");
+      if (Stopped() || !QueryAndEmit(emit))
+        return absl::CancelledError("the scene query was cancelled");
       const uint64_t candidates = std::max<uint64_t>(totals_.candidates - before, 1);
       width = static_cast<uint32_t>(std::clamp<uint64_t>(kCandidatesPerWindow * size / candidates,
                                                          1, std::min(2 * size, kMaxPlacements)));
@@ -86,13 +87,13 @@ class Search {
   }
 
   // Answers the pending pairs in order. Returns false if stopped; then nothing was emitted.
-  bool AskAndEmit(const std::function<void(std::span<const SceneAnswer>)>& emit) {
+  bool QueryAndEmit(const std::function<void(std::span<const SceneAnswer>)>& emit) {
     const size_t tasks = (pairs_.size() + kPairsPerTask - 1) / kPairsPerTask;
     if (parts_.size() < tasks) parts_.resize(tasks);
 #pragma omp parallel for schedule(dynamic) num_threads(threads_)
     for (size_t task = 0; task < tasks; ++task) {
       parts_[task] = {};
-      if (!Stopped()) Ask(task);
+      if (!Stopped()) Query(task);
     }
     if (Stopped()) return false;
     std::vector<SceneAnswer> answers;
@@ -108,10 +109,10 @@ class Search {
     return true;
   }
 
-  void Ask(size_t task) {
+  void Query(size_t task) {
     const size_t end = std::min(pairs_.size(), (task + 1) * kPairsPerTask);
     for (size_t i = task * kPairsPerTask; i < end; ++i) {
-      absl::StatusOr<Answer> answer = scene_.Ask(pairs_[i].a, pairs_[i].b);
+      absl::StatusOr<Answer> answer = scene_.Query(pairs_[i].a, pairs_[i].b);
       if (absl::IsCancelled(answer.status())) return;
       if (answer.ok()) parts_[task].rungs.Add(answer->rung);
       if (answer.ok() && !scene_.IsFound(*answer)) continue;
@@ -217,7 +218,7 @@ absl::StatusOr<SceneSearch> SceneSearch::MakeWith(std::span<const PlacedHull> pl
   } else {
     is_made = scene.ComputeBoxes();
   }
-  if (!is_made || !scene.BuildTree()) return absl::CancelledError("stopped in a scene");
+  if (!is_made || !scene.BuildTree()) return absl::CancelledError("the scene query was cancelled");
   return scene;
 }
 
@@ -252,8 +253,8 @@ bool SceneSearch::IsFound(const Answer& answer) const {
   return answer.relation != Relation::kSeparated;
 }
 
-absl::StatusOr<Answer> SceneSearch::AskWith(uint32_t a, uint32_t b, const QueryOptions& options,
-                                            PiecesAnswer* of_body) const {
+absl::StatusOr<Answer> SceneSearch::QueryWith(uint32_t a, uint32_t b, const QueryOptions& options,
+                                              PiecesAnswer* of_body) const {
   if (!IsBody(a) && !IsBody(b)) return CheckCollision(placements_[a], placements_[b], options);
   absl::StatusOr<BodyAnswer> found = CheckBodies(options_->bodies[a], options_->bodies[b], options);
   if (!found.ok()) return found.status();
@@ -261,12 +262,12 @@ absl::StatusOr<Answer> SceneSearch::AskWith(uint32_t a, uint32_t b, const QueryO
   return std::move(found->answer);
 }
 
-absl::StatusOr<Answer> SceneSearch::Ask(uint32_t a, uint32_t b, PiecesAnswer* of_body) const {
-  absl::StatusOr<Answer> answer = AskWith(a, b, first_look_, of_body);
+absl::StatusOr<Answer> SceneSearch::Query(uint32_t a, uint32_t b, PiecesAnswer* of_body) const {
+  absl::StatusOr<Answer> answer = QueryWith(a, b, first_look_, of_body);
   if (!options_->query.WantsDetails() || !answer.ok() || !IsFound(*answer)) return answer;
   QueryOptions options = options_->query;
   options.threads = 1;
-  return AskWith(a, b, options, of_body);
+  return QueryWith(a, b, options, of_body);
 }
 
 void SceneCandidates::Start(const SceneSearch& scene, uint32_t a) {

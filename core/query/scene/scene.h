@@ -65,7 +65,7 @@ struct SceneTotals {
 };
 
 // A scene for callers with their own threads. FindCollisions is equivalent to iterating the
-// SceneCandidates of every placement and calling Ask for each candidate. Const functions are
+// SceneCandidates of every placement and calling Query for each candidate. Const functions are
 // thread-safe.
 class SceneSearch {
  public:
@@ -75,7 +75,7 @@ class SceneSearch {
   static absl::StatusOr<SceneSearch> Make(std::span<const PlacedHull> placements,
                                           const SceneOptions& options);
   // Takes precomputed boxes: BoundingBox of each placement, at rest; otherwise MovingBoxOf. The
-  // answers of Ask are about placements at rest.
+  // answers of Query are about placements at rest.
   static absl::StatusOr<SceneSearch> Make(std::span<const PlacedHull> placements,
                                           const SceneOptions& options, std::vector<Box> boxes);
   static absl::StatusOr<SceneSearch> Make(std::span<const PlacedHull> placements,
@@ -90,7 +90,7 @@ class SceneSearch {
   // Returns the answer of a candidate, with the requested details if the pair is found. `of_body`:
   // if not null, receives the details specific to bodies. CANCELLED: should_stop returned true.
   // INVALID_ARGUMENT, RESOURCE_EXHAUSTED: for a candidate with a body, as in CheckBodies.
-  absl::StatusOr<Answer> Ask(uint32_t a, uint32_t b, PiecesAnswer* of_body = nullptr) const;
+  absl::StatusOr<Answer> Query(uint32_t a, uint32_t b, PiecesAnswer* of_body = nullptr) const;
   // Returns true if the pair is not SEPARATED or is within the clearance.
   bool IsFound(const Answer& answer) const;
   // In a scene with motions: returns false only if the boxes of the pair are disjoint at each time
@@ -121,8 +121,8 @@ class SceneSearch {
   bool IsBody(uint32_t placement) const {
     return !options_->bodies.empty() && !options_->bodies[placement].body().is_hull();
   }
-  absl::StatusOr<Answer> AskWith(uint32_t a, uint32_t b, const QueryOptions& options,
-                                 PiecesAnswer* of_body) const;
+  absl::StatusOr<Answer> QueryWith(uint32_t a, uint32_t b, const QueryOptions& options,
+                                   PiecesAnswer* of_body) const;
   uint64_t CountPairs() const;
   // Returns the first placement that may be a candidate of `placement`.
   uint32_t FirstCandidate(uint32_t placement) const {
@@ -194,8 +194,8 @@ class SceneCandidates {
   size_t next_ = 0;
 };
 
-// Maximum number of answers that FindCollisions buffers. A choice: three to four MiB with
-// certificates, and enough for many threads.
+// Maximum number of answers that FindCollisions buffers: three to four MiB with certificates, and
+// enough for many threads. Not tuned.
 inline constexpr size_t kMaxEmittedAnswers = 4096;
 
 // Finds all colliding pairs of placements. A tree of bounding boxes yields the pairs with

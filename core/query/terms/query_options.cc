@@ -32,10 +32,10 @@ constexpr char kDepthPayload[] = "hulld/depth-bytes";
 }  // namespace
 
 absl::Status DepthTooLarge(uint64_t max_depth_bytes) {
-  absl::Status status = absl::ResourceExhaustedError(
-      absl::StrCat("the exact depth of this overlap needs more than ", max_depth_bytes,
-                   " bytes; ask with a max_error that rounding allows and without the normal, or "
-                   "simplify the hulls"));
+  absl::Status status = absl::ResourceExhaustedError(absl::StrCat(
+      "the exact depth of this overlap needs more than ", max_depth_bytes,
+      " bytes; request a max_error that floating point can meet, and no normal, or simplify "
+      "the hulls"));
   status.SetPayload(kDepthPayload, absl::Cord());
   return status;
 }

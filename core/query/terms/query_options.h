@@ -32,8 +32,8 @@ struct QueryOptions {
   // to kDefaultRelativeMaxError times the sizes of the hulls and the separation. If a double cannot
   // represent the value that accurately, the bound is its rounding error.
   std::optional<double> max_error;
-  // Requests Answer::within_clearance: separation <= clearance, exactly. Always true at infinity,
-  // never at -infinity.
+  // Requests Answer::within_clearance: separation <= clearance, exactly. Always true for infinity,
+  // never for -infinity.
   std::optional<double> clearance;
   // tau >= 0, in the caller's length unit. If 0, the relation is always exact. If positive, the
   // relation may be kWithinTolerance if |separation| <= tau. Cannot be combined with a requested

@@ -185,7 +185,7 @@ PlacedAnswer QueryAtRest(const PlacementTable& table, uint32_t a, uint32_t b,
 }
 
 size_t AddCertificates(const PlacementTable& table, uint32_t a, uint32_t b,
-                       const std::vector<PieceCertificate>& certificates, size_t most,
+                       const std::vector<PieceCertificate>& certificates, size_t max_bytes,
                        google::protobuf::RepeatedPtrField<v1::PieceCertificate>* messages) {
   // Tag and length.
   constexpr size_t kEntryBytes = 4;
@@ -195,7 +195,7 @@ size_t AddCertificates(const PlacementTable& table, uint32_t a, uint32_t b,
     EncodePieceCertificate(certificate, table.HullOfPiece(a, certificate.pieces.a).hull(),
                            table.HullOfPiece(b, certificate.pieces.b).hull(), message);
     bytes += kEntryBytes + message->ByteSizeLong();
-    if (bytes > most) break;
+    if (bytes > max_bytes) break;
   }
   return bytes;
 }

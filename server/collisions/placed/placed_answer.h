@@ -99,9 +99,10 @@ PlacedAnswer QueryPlaced(const PlacementTable& table, uint32_t a, uint32_t b,
 PlacedAnswer QueryAtRest(const PlacementTable& table, uint32_t a, uint32_t b,
                          const QueryOptions& options, PairCache* cache);
 
-// Adds the certificates of pairs of pieces until they exceed `most` bytes. Returns the bytes added.
+// Adds the certificates of pairs of pieces until they exceed `max_bytes` bytes. Returns the bytes
+// added.
 size_t AddCertificates(const PlacementTable& table, uint32_t a, uint32_t b,
-                       const std::vector<PieceCertificate>& certificates, size_t most,
+                       const std::vector<PieceCertificate>& certificates, size_t max_bytes,
                        google::protobuf::RepeatedPtrField<v1::PieceCertificate>* messages);
 
 // Adds the row of such an answer as AddAnswer does, or a row without an answer if the certificates

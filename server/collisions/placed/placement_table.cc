@@ -543,8 +543,8 @@ void PlacementTable::EncodeProblem(size_t i, v1::PlacementProblem* message) cons
   message->set_reason(ReasonOf(status));
 }
 
-absl::Status RefuseMotions(const google::protobuf::RepeatedPtrField<v1::Placement>& placements,
-                           const v1::PackedPlacements& packed, const char* what) {
+absl::Status CheckNoMotions(const google::protobuf::RepeatedPtrField<v1::Placement>& placements,
+                            const v1::PackedPlacements& packed, const char* what) {
   const auto moving = std::ranges::find_if(placements, &v1::Placement::has_end_pose);
   if (moving == placements.end() && packed.end_poses().empty()) return absl::OkStatus();
   const std::string field =
@@ -585,7 +585,7 @@ absl::Status ValidateMoves(const google::protobuf::RepeatedField<uint32_t>& plac
   return absl::OkStatus();
 }
 
-std::string ThereArePlacements(size_t count) {
+std::string PlacementCountText(size_t count) {
   return count == 1 ? "there is 1 placement" : absl::StrCat("there are ", count, " placements");
 }
 
@@ -603,7 +603,7 @@ absl::Status ValidatePairs(const google::protobuf::RepeatedField<uint32_t>& pair
   for (int i = 0; i < pairs.size(); ++i) {
     if (pairs[i] >= placements) {
       return absl::InvalidArgumentError(absl::StrCat("pairs[", i, "] is ", pairs[i], ", but ",
-                                                     ThereArePlacements(placements),
+                                                     PlacementCountText(placements),
                                                      "; indices start at 0"));
     }
   }

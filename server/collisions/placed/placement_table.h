@@ -262,8 +262,8 @@ class PlacementTable {
 
 // Returns OK if no placement has an end pose. INVALID_ARGUMENT, naming the first field with one:
 // the call does not accept motions. what: the subject of the error, as in "a stream".
-absl::Status RefuseMotions(const google::protobuf::RepeatedPtrField<v1::Placement>& placements,
-                           const v1::PackedPlacements& packed, const char* what);
+absl::Status CheckNoMotions(const google::protobuf::RepeatedPtrField<v1::Placement>& placements,
+                            const v1::PackedPlacements& packed, const char* what);
 
 // Checks that the first message of a stream, and no other, is `open`. Otherwise returns
 // INVALID_ARGUMENT. twice: the error for a second `open`.
@@ -287,7 +287,7 @@ inline constexpr int kMaxShortUpdate = 4096;
 
 // Returns an error text that states the number of placements. It fits both forms of a request,
 // because it names no field that the caller may not have sent.
-std::string ThereArePlacements(size_t count);
+std::string PlacementCountText(size_t count);
 
 // INVALID_ARGUMENT: an odd number of indices, or an index out of range. RESOURCE_EXHAUSTED: more
 // than max_pairs (--max-pairs-per-batch).

@@ -37,7 +37,7 @@ absl::Status ValidateGroups(const Scene& scene, size_t placements) {
   }
   if (scene.movers() > placements) {
     return absl::InvalidArgumentError(
-        absl::StrCat("movers is ", scene.movers(), ", but ", ThereArePlacements(placements)));
+        absl::StrCat("movers is ", scene.movers(), ", but ", PlacementCountText(placements)));
   }
   return absl::OkStatus();
 }

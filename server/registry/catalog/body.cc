@@ -76,9 +76,9 @@ void BodyTable::Erase(Locked& locked, const std::string& id) {
 }
 
 void BodyTable::DropSome(Locked& locked) {
-  if (!most_.has_value()) return;
+  if (!capacity_.has_value()) return;
   int skipped = 0;
-  while (bytes_ > *most_ && skipped < kMaxSkipped && !used_.empty()) {
+  while (bytes_ > *capacity_ && skipped < kMaxSkipped && !used_.empty()) {
     const std::string id = *used_.back();
     if (entries_.at(id).IsUnused()) {
       Erase(locked, id);

@@ -74,10 +74,10 @@ class Body {
 
 // Bodies of a registry by ID, including their pieces.
 //
-// If the store finds records, this is a cache: an ID without an entry is unknown, unless the hull
-// table knows its hull or its absence. Bodies range from a few hundred bytes to
-// --max-pieces-per-body pieces, so the bound is in bytes. Eviction removes unreferenced bodies,
-// least recently used first.
+// If the store supports record lookup, this is a cache: an ID without an entry is unknown, unless
+// the hull table knows its hull or its absence. The capacity is in bytes, because bodies range from
+// a few hundred bytes to --max-pieces-per-body pieces. Eviction removes unreferenced bodies, least
+// recently used first.
 //
 // Guarded by the registry's mutex.
 class BodyTable {
@@ -105,9 +105,9 @@ class BodyTable {
   // Approximate bytes of an entry, excluding the pieces and names of its body.
   static constexpr uint64_t kBytesOfEntry = 512;
 
-  // Makes this a cache of at most `bytes`, exceeded only by entries in use. Requires an empty
-  // table.
-  void KeepAtMost(uint64_t bytes) { most_ = bytes; }
+  // Makes this a cache of at most `bytes`. Only entries in use may exceed the capacity. Requires an
+  // empty table.
+  void SetCapacity(uint64_t bytes) { capacity_ = bytes; }
 
   size_t size() const { return entries_.size(); }
   bool contains(const std::string& id) const { return entries_.contains(id); }
@@ -134,8 +134,8 @@ class BodyTable {
   // Most recently used first.
   std::list<const std::string*> used_;
   uint64_t bytes_ = 0;
-  // Limit in bytes; set if this is a cache.
-  std::optional<uint64_t> most_;
+  // In bytes; set if this is a cache.
+  std::optional<uint64_t> capacity_;
 };
 
 // A body as seen by one call. References the hulls of its pieces. Charged to --memory-limit.

@@ -87,7 +87,7 @@ void HullTable::Wake(const std::string& id, Entry& entry) {
   if (resting.compact != nullptr) entry.awake_->Restore(*resting.compact);
 }
 
-// Sets the points of a hull at rest, counts them, and returns the former ones. Under memory
+// Sets the points of a hull at rest, counts them, and returns the previous ones. Under memory
 // pressure they are evicted first: the hulls of the other accounts were used since.
 std::unique_ptr<CompactHull> HullTable::ExchangeCompact(Entry& entry,
                                                         std::unique_ptr<CompactHull> compact) {
@@ -164,11 +164,11 @@ bool HullTable::RestCompact(Locked& locked, Entry& entry) {
   if (compact == nullptr) return false;
   // The points of an unchanged hull stay in place: copies would be scattered over the pages that
   // its other structures vacate.
-  const RestingHull& former = entry.resting_;
+  const RestingHull& previous = entry.resting_;
   const HullRecord& record = entry.awake_->committed().record;
-  const bool is_unchanged = former.compact != nullptr && former.revision == record.revision &&
-                            former.create_revision == record.create_revision &&
-                            former.compact->writers == compact->writers;
+  const bool is_unchanged = previous.compact != nullptr && previous.revision == record.revision &&
+                            previous.create_revision == record.create_revision &&
+                            previous.compact->writers == compact->writers;
   if (is_unchanged) compact = ExchangeCompact(entry, nullptr);
   if (compact->points.empty() && compact->writers.empty()) compact = nullptr;
   ExchangeCompact(entry, nullptr);
@@ -231,7 +231,8 @@ void HullTable::RestSome(Locked& locked) {
     if (entry.awake_ != nullptr) {
       if (!entry.awake_->IsAtRest() || !RestCompact(locked, entry)) continue;
     }
-    if (!is_cache() || entries_.size() <= *most_ || std::exchange(entry.is_used_, false)) continue;
+    if (!is_cache() || entries_.size() <= *capacity_ || std::exchange(entry.is_used_, false))
+      continue;
     EraseEntry(visited);
   }
 }

@@ -53,9 +53,9 @@ struct CompactHull {
 // record and its points (CompactHull). If the store can read it back, the points are evicted before
 // any hull in use.
 //
-// If the store finds records, this is a cache of records, and of IDs known to have neither a hull
-// nor a body: an ID without an entry is unknown. When the cache exceeds its limit, the hand evicts
-// entries that are at rest and were not looked up since its last visit.
+// If the store supports record lookup, this is a cache of records, and of IDs known to have neither
+// a hull nor a body: an ID without an entry is unknown. When the cache exceeds its capacity, the
+// hand evicts entries that are at rest and were not looked up since its last visit.
 //
 // Guarded by the registry's mutex.
 class HullTable {
@@ -66,9 +66,9 @@ class HullTable {
   // readable: true if the store can read hulls back. The budget must outlive this.
   HullTable(bool readable, MemoryBudget& budget);
 
-  // Makes this a cache of at most `records`, exceeded only by hulls in use. Requires an empty
-  // table.
-  void KeepAtMost(size_t records) { most_ = records; }
+  // Makes this a cache of at most `records`. Only hulls in use may exceed the capacity. Requires an
+  // empty table.
+  void SetCapacity(size_t records) { capacity_ = records; }
 
  private:
   // State of a hull at rest, except its ID.
@@ -150,15 +150,15 @@ class HullTable {
   // its limit. Cost: O(log n).
   void RestSome(Locked& locked);
   static constexpr int kHullsPerStep = 4;
-  // Visits the hulls after `cursor`, initially empty, within one hold of the mutex. Puts small
-  // hulls to rest that are in memory, unused, and have not been looked up since the last visit.
-  // Returns false if no hull is left to visit; returns false immediately if the last two passes
-  // found no hull in use and none has been looked up since. Cost: about 50 us.
+  // Visits the hulls after `cursor`, initially empty, as many as fit into one critical section.
+  // Puts small hulls to rest that are in memory, unused, and have not been looked up since the last
+  // visit. Returns false if no hull is left to visit; returns false immediately if the last two
+  // passes found no hull in use and none has been looked up since. Cost: about 50 us.
   bool RestIdle(Locked& locked, std::string& cursor);
   // Call after a change of the hull if no session is expected to change it further. Puts a small
   // hull to rest after kMaxJustChanged later calls for small hulls, unless it is looked up before
-  // then. A server that is being filled with small hulls therefore keeps few of them in their large
-  // form. Cost: about 1 us.
+  // then. So a server that is being filled with small hulls keeps only a few of them in full form.
+  // Cost: about 1 us.
   void RestSoon(Locked& locked, const RegisteredHull& hull);
   static constexpr size_t kMaxJustChanged = 1024;
   // Bytes of the points and writers of hulls at rest, which count against the budget.
@@ -182,7 +182,7 @@ class HullTable {
     }
   };
 
-  bool is_cache() const { return most_.has_value(); }
+  bool is_cache() const { return capacity_.has_value(); }
   std::pair<Place, bool> AddEntry(const std::string& id);
   void EraseEntry(Place place);
   Entry& Add(const std::string& id);
@@ -196,8 +196,8 @@ class HullTable {
   Entries entries_;
   // All entries, for lookups. A search of the ordered map takes about 2 us with a million entries.
   absl::flat_hash_set<Place, HashOfId, EqualIds> index_;
-  // Limit in records; set if this is a cache.
-  std::optional<size_t> most_;
+  // In records; set if this is a cache.
+  std::optional<size_t> capacity_;
   // ID of the last hull that RestSome visited, and of the last one that DropCompact visited.
   std::string hand_;
   std::string compact_hand_;

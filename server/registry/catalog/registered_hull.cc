@@ -39,7 +39,7 @@ void RegisteredHull::SetStored(const StoredHull& stored) {
 
 // The old mark may hold the last reference to a previous preparation.
 void RegisteredHull::SetCommittedMark(Locked& locked, const LiveHull::Mark& mark) {
-  locked.Afterwards([before = std::exchange(committed_.mark, mark)] {});
+  locked.Defer([before = std::exchange(committed_.mark, mark)] {});
   if (const Box box = BoxAt(mark); !box.IsEmpty()) committed_.box = box;
 }
 
@@ -207,7 +207,7 @@ void RegisteredHull::Revert(Locked& locked) {
 void RegisteredHull::RevertLive(Locked& locked) {
   if (!std::exchange(in_flight_.live_is_ahead, false)) return;
   HULLD_CHECK(live() != nullptr);
-  // A thread that builds on refused points keeps the former LiveHull, now as its only owner.
+  // A thread that builds on refused points keeps the previous LiveHull, now as its only owner.
   auto reverted = std::make_shared<LiveHull>(*live(), committed_.mark);
   locked.Discard(std::exchange(served_.live, std::move(reverted)));
   DiscardServed(locked);
@@ -300,7 +300,7 @@ void RegisteredHull::NoteUse() {
               is_for_writing);
 }
 
-// A part at a repeated address reuses free memory: the former part had no holder.
+// If an address repeats, its memory was freed and reused, so the earlier part had no holder.
 void RegisteredHull::CountParts() {
   MemoryParts parts;
   served_.shared_bytes = 0;

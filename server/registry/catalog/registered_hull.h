@@ -121,8 +121,8 @@ class RegisteredHull {
 
   // Sets the builder of a hull that is not committed yet.
   void SetBuilder(std::unique_ptr<HullBuilder> builder);
-  // Lends the builder to a thread that may append to live() until it returns it. bytes: memory of
-  // the returned builder.
+  // Lends the builder to a thread, which may append to live() until it returns the builder. bytes:
+  // memory of the returned builder.
   LentBuilder LendBuilder();
   void ReturnBuilder(std::unique_ptr<HullBuilder> builder, uint64_t bytes);
   const HullBuilder* builder() const { return in_flight_.builder.get(); }
@@ -194,8 +194,8 @@ class RegisteredHull {
   void DiscardAll(Locked& locked);
   // Returns a chunk to the queue, before all later chunks.
   void Requeue(PendingChunk chunk);
-  // True if an earlier chunk than this one is queued. Requires: this one is not queued.
-  bool IsQueuedBefore(const PendingChunk& chunk) const {
+  // Returns true if a chunk that precedes this one is queued. Requires: this one is not queued.
+  bool HasEarlierChunk(const PendingChunk& chunk) const {
     return !chunks.empty() && chunks.front().place < chunk.place;
   }
 
@@ -298,7 +298,7 @@ const std::shared_ptr<const ServedHull>& EmptyServedHull();
 // Calls `done` after the mutex is released.
 template <typename T>
 void Answer(Locked& locked, const Reply<T>& done, std::type_identity_t<absl::StatusOr<T>> result) {
-  locked.Afterwards([done, result = std::move(result)] { done(result); });
+  locked.Defer([done, result = std::move(result)] { done(result); });
 }
 
 std::string QuotedHull(const std::string& id);

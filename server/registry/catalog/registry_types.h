@@ -108,11 +108,10 @@ struct Replacement {
 // A body at one revision, shared by readers.
 class Body;
 
-// Kind of change of a hull, as v1::HullEventKind.
+// Kind of change of a hull, like v1::HullEventKind.
 enum class ChangeKind { kPresent, kCreated, kChanged, kReplaced, kDeleted };
 
-// A hull or body as lists and replies describe it, or its net change since the last notification of
-// a watch.
+// Describes a hull or body in lists and replies, or its net change since a watch was last notified.
 struct HullChange {
   ChangeKind kind = ChangeKind::kPresent;
   // kDeleted: only the ID, and the revision of the deletion. For a body: ID and revisions.

@@ -162,7 +162,7 @@ absl::StatusOr<uint64_t> LocalChanges::CommittedSequence(Locked& locked, Registe
   hull.EndReadingSequence();
   if (absl::IsAborted(sequence.status())) {
     HULLD_RETURN_IF_ERROR(peers_.AwaitPeers(locked, {}));
-    // Every caller checks for this.
+    // Every caller checks whether the hull is gone.
     if (hull.state.gone()) return 0;
     if (hull.supersessions() == supersessions && hull.committed().record == record) {
       return StoreDisagrees(record);
@@ -209,7 +209,7 @@ void LocalChanges::RunNextChunk(const HullPointer& hull) {
   ApplyChunk(locked, hull, pending);
   pending.chunk.points = {};
   pending.charge.Set(0);
-  if (pending.on_built) locked.Afterwards(std::exchange(pending.on_built, nullptr));
+  if (pending.on_built) locked.Defer(std::exchange(pending.on_built, nullptr));
   hull->state.EndWork();
   hull->NoteUse();
   state_.memory.Evict(locked);
@@ -223,7 +223,7 @@ void LocalChanges::RefuseChunks(const HullPointer& hull) {
   const absl::Status reason = hull->state.gone() ? GoneWhileStreaming(*hull) : hull->state.damage();
   for (PendingChunk& pending : std::exchange(hull->chunks, {})) {
     AnswerChunk(locked, pending.done, pending.chunk.sequence, reason);
-    if (pending.on_built) locked.Afterwards(std::move(pending.on_built));
+    if (pending.on_built) locked.Defer(std::move(pending.on_built));
   }
 }
 
@@ -237,7 +237,7 @@ void LocalChanges::ApplyChunk(Locked& locked, const HullPointer& hull, PendingCh
     const absl::Status fresh = peers_.AwaitPeers(locked, pending.should_stop);
     is_new = fresh.ok() ? CheckChunk(locked, *hull, pending) : fresh;
     // An earlier chunk must be rebuilt first.
-    if (hull->IsQueuedBefore(pending)) {
+    if (hull->HasEarlierChunk(pending)) {
       hull->Requeue(std::move(pending));
       return;
     }
@@ -252,7 +252,7 @@ void LocalChanges::ApplyChunk(Locked& locked, const HullPointer& hull, PendingCh
   absl::StatusOr<BuiltChunk> built = Build(locked, *hull, pending);
   if (Committer::IsSuperseded(built.status())) {
     if (!Stopped(pending.should_stop)) {
-      // It will be rebuilt.
+      // The chunk will be built again.
       hull->Requeue(std::move(pending));
       return;
     }
@@ -305,8 +305,8 @@ absl::StatusOr<LocalChanges::BuiltChunk> LocalChanges::Build(Locked& locked, Reg
   BuiltChunk built;
   Change& change = built.change;
   change.hull = hull.head();
-  change.former_vertices = hull.head().record.vertex_count;
-  change.former_layout = hull.head().layout;
+  change.previous_vertices = hull.head().record.vertex_count;
+  change.previous_layout = hull.head().layout;
   LentBuilder lent = hull.LendBuilder();
 
   locked.Unlock();

@@ -15,8 +15,8 @@
 namespace hulld::server {
 namespace {
 
-// Moves the replacement's vertices into the change. former: null if no hull exists.
-Change MakeChange(const RegisteredHull* former, Replacement& replacement) {
+// Moves the replacement's vertices into the change. previous: null if no hull exists.
+Change MakeChange(const RegisteredHull* previous, Replacement& replacement) {
   Change change;
   change.begins = true;
   HullRecord& record = change.hull.record;
@@ -24,7 +24,7 @@ Change MakeChange(const RegisteredHull* former, Replacement& replacement) {
   record.dimension = replacement.builder->dimension();
   record.vertex_count = replacement.builder->vertex_count();
   record.counts = replacement.counts;
-  if (former != nullptr) change.replaced = former->committed();
+  if (previous != nullptr) change.replaced = previous->committed();
   if (!replacement.vertices.empty()) {
     change.vertex_change = VertexChange::kReplaced;
     change.vertices = std::move(replacement.vertices);
@@ -48,9 +48,9 @@ template <typename Refuse>
 bool IsRefused(Locked& locked, const absl::Status& status, const LockedTask& again,
                const Refuse& refuse) {
   if (Committer::IsSuperseded(status)) {
-    locked.AfterwardsLocked(again);
+    locked.DeferLocked(again);
   } else if (!status.ok()) {
-    locked.Afterwards([=] { refuse(status); });
+    locked.Defer([=] { refuse(status); });
   }
   return !status.ok();
 }
@@ -133,7 +133,7 @@ void LocalChanges::Delete(const std::string& kind, const std::string& id,
       return SubmitBody(locked, std::move(change), finish);
     }
     change.hull = hull->committed();
-    change.former_layout = change.hull.layout;
+    change.previous_layout = change.hull.layout;
     hull->state.StartEnding();
     Submit(locked, hull, std::move(change), finish);
   });
@@ -148,56 +148,56 @@ void LocalChanges::Replace(Replacement replacement, const Reply<PutHullResult>& 
   const auto shared = std::make_shared<Replacement>(std::move(replacement));
   records_.WhenReady(shared->hull_id, RecordReader::For::kQuiet, done,
                      [=, this](Locked& locked, const LockedTask& again) {
-                       const HullPointer former = state_.Find(shared->hull_id);
-                       const absl::Status allowed = CheckReplacement(former.get(), *shared);
+                       const HullPointer previous = state_.Find(shared->hull_id);
+                       const absl::Status allowed = CheckReplacement(previous.get(), *shared);
                        if (!allowed.ok()) return Answer(locked, done, allowed);
-                       CommitReplacement(locked, former, shared, done, again);
+                       CommitReplacement(locked, previous, shared, done, again);
                      });
 }
 
-// Returns OK if the replacement is allowed. former: null if no hull exists.
-absl::Status LocalChanges::CheckReplacement(const RegisteredHull* former,
+// Returns OK if the replacement is allowed. previous: null if no hull exists.
+absl::Status LocalChanges::CheckReplacement(const RegisteredHull* previous,
                                             const Replacement& replacement) const {
   const std::string& id = replacement.hull_id;
-  const uint64_t revision = former == nullptr ? 0 : former->committed().record.revision;
+  const uint64_t revision = previous == nullptr ? 0 : previous->committed().record.revision;
   if (replacement.if_revision.value_or(revision) != revision) {
     return RevisionMismatch("hull", id, revision, *replacement.if_revision);
   }
-  if (former != nullptr) return absl::OkStatus();
+  if (previous != nullptr) return absl::OkStatus();
   if (!replacement.create_if_absent) return state_.NoSuchHull(id);
   if (state_.bodies.contains(id)) return IdTaken("body", id);
   return state_.CheckHullCount();
 }
 
-// Submits a replacement, moving its builder and points. former: null if no hull exists; otherwise
+// Submits a replacement, moving its builder and points. previous: null if no hull exists; otherwise
 // quiet. again: called if a peer server changed the ID first.
-void LocalChanges::CommitReplacement(Locked& locked, const HullPointer& former,
+void LocalChanges::CommitReplacement(Locked& locked, const HullPointer& previous,
                                      const std::shared_ptr<Replacement>& replacement,
                                      const Reply<PutHullResult>& done, const LockedTask& again) {
-  Change change = MakeChange(former.get(), *replacement);
+  Change change = MakeChange(previous.get(), *replacement);
   const auto hull = std::make_shared<RegisteredHull>(change.hull, HullState::Creating(),
                                                      state_.store.keeps_hulls(), state_.memory);
-  if (former == nullptr) {
+  if (previous == nullptr) {
     state_.hulls.Insert(hull);
     state_.BeginCreatingHull();
   } else {
-    // `hull` enters the table when it replaces the former hull.
-    former->state.StartEnding();
+    // `hull` enters the table when it replaces the previous hull.
+    previous->state.StartEnding();
   }
   hull->SetLive(std::move(replacement->live));
   hull->SetBuilder(std::make_unique<HullBuilder>(std::move(*replacement->builder)));
-  Submit(locked, former == nullptr ? hull : former, std::move(change),
+  Submit(locked, previous == nullptr ? hull : previous, std::move(change),
          [=, this](Locked& later, const absl::Status& status, Change& replaced) {
            if (Committer::IsSuperseded(status)) RestoreReplacement(*hull, replaced, *replacement);
-           if (former == nullptr) state_.EndCreatingHull(later, hull, status);
+           if (previous == nullptr) state_.EndCreatingHull(later, hull, status);
            if (IsRefused(later, status, again, done)) return;
-           state_.ApplyCreation(later, former, hull, replaced.hull);
+           state_.ApplyCreation(later, previous, hull, replaced.hull);
            hull->DiscardUnneededBuilder(later);
            hull->NoteUse();
            state_.hulls.RestSoon(later, *hull);
            state_.memory.Evict(later);
            Answer(later, done,
-                  PutHullResult{state_.revision(), replaced.hull.record, former == nullptr});
+                  PutHullResult{state_.revision(), replaced.hull.record, previous == nullptr});
          });
 }
 
@@ -320,7 +320,7 @@ void LocalChanges::Advance(Locked& locked, const HullPointer& hull, bool is_last
   if (hull->state.in_flight() > 0 && (repeated || next.chunk.if_revision.has_value())) return;
   hull->state.Schedule();
   // The task acquires the mutex, so it would only wait if it started before the release.
-  locked.Afterwards([this, hull, is_last, client = next.session.client] {
+  locked.Defer([this, hull, is_last, client = next.session.client] {
     writers_.Submit([this, hull] { RunNextChunk(hull); }, client, is_last);
   });
 }

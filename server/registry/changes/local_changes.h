@@ -30,12 +30,12 @@ struct PendingChunk;
 // writers' chunks (hull_appender.cc).
 //
 // Creation, deletion, and replacement depend on the state of an ID: they load that state, wait
-// until no change of the ID is in flight, and then decide within one hold of the mutex. Chunks
-// overlap. The thread that owns the hull's builder (HullState) builds a chunk without the mutex and
-// appends the new vertices to the LiveHull; the resulting change is submitted, and the next chunk
-// of the hull may be built on it immediately. If the batch fails, all later chunks fail too, and
-// the hull returns to its last committed state (Revert). If a peer server committed first, a change
-// is retried on the new state, and a chunk returns to its place in the queue.
+// until no change of the ID is in flight, and then decide in one critical section. Chunks overlap.
+// The thread that owns the hull's builder (HullState) builds a chunk without the mutex and appends
+// the new vertices to the LiveHull; the resulting change is submitted, and the next chunk of the
+// hull may be built on it immediately. If the batch fails, all later chunks fail too, and the hull
+// returns to its last committed state (Revert). If a peer server committed first, a change is
+// retried on the new state, and a chunk returns to its place in the queue.
 //
 // Invariants:
 //   - Advance follows each transition of a hull's HullState, so no runnable task keeps waiting. It
@@ -78,7 +78,7 @@ class LocalChanges {
   void PutBody(StoredBody stored, std::optional<uint64_t> if_revision,
                const Reply<PutBodyResult>& done);
   // Replaces a hull atomically for all readers. The result is a new incarnation: sessions of the
-  // former one end. Replies as above. Requires a builder. Copies the vertices, so it must not run
+  // previous one end. Replies as above. Requires a builder. Copies the vertices, so it must not run
   // on a gRPC thread. NOT_FOUND, unless create_if_absent; ABORTED: if_revision does not match;
   // RESOURCE_EXHAUSTED: --max-hulls, or the disk is full; UNAVAILABLE: as above.
   void Replace(Replacement replacement, const Reply<PutHullResult>& done);
@@ -119,8 +119,9 @@ class LocalChanges {
   absl::Status CheckPutBody(Locked& locked, const std::string& id,
                             std::optional<uint64_t> if_revision);
   void SubmitBody(Locked& locked, Change change, Committer::Completion finish);
-  absl::Status CheckReplacement(const RegisteredHull* former, const Replacement& replacement) const;
-  void CommitReplacement(Locked& locked, const HullPointer& former,
+  absl::Status CheckReplacement(const RegisteredHull* previous,
+                                const Replacement& replacement) const;
+  void CommitReplacement(Locked& locked, const HullPointer& previous,
                          const std::shared_ptr<Replacement>& replacement,
                          const Reply<PutHullResult>& done, const LockedTask& again);
 

@@ -62,7 +62,7 @@ void Committer::StartBarrier(Locked& locked, Barrier barrier) {
     if (may_start) is_starting_ = true;
   }
   if (may_start) {
-    locked.Afterwards([this] { StartFetch(); });
+    locked.Defer([this] { StartFetch(); });
   } else {
     ready_.notify_one();
   }
@@ -186,7 +186,7 @@ void Committer::Settle(Round& round, const absl::Status& status, const absl::Sta
   if (was_written) {
     const std::lock_guard lock(mutex_);
     if (!status.ok() && !statistics_.failing) {
-      spdlog::error("changes refused: {}", std::string(status.message()));
+      spdlog::error("a batch of changes could not be committed: {}", std::string(status.message()));
     }
     statistics_.failing = !status.ok();
     if (status.ok()) {
@@ -232,7 +232,7 @@ void Committer::ApplyPeerChanges(Locked& locked, const PeerChanges& changes,
   }
   peers_->Apply(locked, changes);
   // Destroys large changes without a lock.
-  locked.Afterwards([ended = std::make_shared<std::vector<Pending>>(std::move(superseded))] {});
+  locked.Defer([ended = std::make_shared<std::vector<Pending>>(std::move(superseded))] {});
 }
 
 }  // namespace hulld::server

@@ -33,7 +33,7 @@ struct CommitStatistics {
 // next batch.
 //
 // Two locks are used. `order` belongs to the submitters. They hold it while they submit, so the
-// queue has the order of their records. The completions of a refused batch run within one hold of
+// queue has the order of their records. The completions of a refused batch run without releasing
 // it, which makes a refusal safe: between the emptying of the queue and the last completion, no
 // change that builds on a refused one can be submitted. The completions of a committed batch
 // release it after every kMaxPerHold completions: each completion leaves a consistent state, and a
@@ -48,12 +48,12 @@ class Committer {
   // submit the next change.
   using Completion = std::function<void(Locked& order, const absl::Status&, Change&)>;
 
-  // True if a change is refused because a peer server changed the same ID first (shared store). Its
-  // base is stale; the submitter retries it.
+  // Returns true if a change was refused because a peer server changed the same ID first (shared
+  // store). The change is based on a stale state; its submitter retries it.
   static bool IsSuperseded(const absl::Status& status) { return absl::IsAborted(status); }
-  // Called, with `order` held, after everything submitted before the barrier is committed or
-  // refused, and the changes that peer servers had committed are applied; or with the error of the
-  // query for them.
+  // Called with `order` held, once everything submitted before the barrier is committed or refused,
+  // and all changes that peer servers committed before it are applied. Receives the error if these
+  // could not be queried.
   using Barrier = std::function<void(Locked& order, const absl::Status&)>;
 
   // Receives the changes of peer servers. All functions require `order` and run on the committer's
@@ -72,7 +72,8 @@ class Committer {
     virtual void NoteSynced(SteadyClock::time_point queried_at) = 0;
   };
 
-  // Completions of committed changes within one hold of `order`; each takes about a microsecond.
+  // Maximum number of completions of committed changes until `order` is released; each takes about
+  // a microsecond.
   static constexpr size_t kMaxPerHold = 128;
 
   // Both must outlive this.

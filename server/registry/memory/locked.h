@@ -20,23 +20,23 @@
 
 namespace hulld::server {
 
-// Maximum number of hulls and bodies looked up within one hold of the registry's mutex; takes about
+// Maximum number of hulls and bodies looked up before the registry's mutex is released; takes about
 // 50 us.
 inline constexpr uint64_t kMaxLookupsPerHold = 128;
 
-// Longest hold of a mutex, and the maximum work within one hold.
+// Longest time that a mutex was held, and the maximum work done while it was held.
 struct HoldStatistics {
-  // Longest hold within this minute and the one before. Waiting on a condition is not a hold.
+  // Longest time within this minute and the one before, excluding waits on a condition variable.
   std::chrono::nanoseconds longest{0};
-  // Maximum number of hulls looked up within one hold.
+  // Maximum number of hulls looked up before the mutex was released.
   uint64_t max_lookups = 0;
 };
 
 // A mutex without barging: a waiting thread gets the mutex before the releasing thread can acquire
 // it again, so work that is divided into slices yields between them. Measures its hold times.
 //
-// The next thread in line holds `entry_` while it waits. A returning thread waits for `entry_`, and
-// thus until the next one has the mutex.
+// The next thread in line holds `entry_` while it waits. A thread that returns waits for `entry_`,
+// and therefore until the next thread has the mutex.
 class FairMutex {
  public:
   FairMutex() = default;
@@ -121,7 +121,7 @@ class Locked {
   // Releases the mutex and runs the deferred tasks in order.
   void Unlock() {
     HULLD_CHECK(is_held_);
-    const std::vector<std::function<void()>> due = std::exchange(afterwards_, {});
+    const std::vector<std::function<void()>> due = std::exchange(deferred_, {});
     is_held_ = false;
     mutex_.unlock();
     for (const std::function<void()>& task : due) task();
@@ -159,8 +159,8 @@ class Locked {
     return absl::OkStatus();
   }
 
-  // Calls start(done), then blocks as Await until done(locked, status) has been called with the
-  // mutex held, perhaps on another thread, and returns that status.
+  // Calls start(done), then blocks, like Await, until done(locked, status) is called with the mutex
+  // held, perhaps on another thread. Returns that status.
   template <typename Start>
   absl::Status AwaitCall(const std::function<bool()>& should_stop, const Start& start) {
     struct Wait {
@@ -177,19 +177,19 @@ class Locked {
     return stopped.ok() ? *wait->result : stopped;
   }
 
-  // Counts a lookup within this hold of the mutex.
+  // Counts a lookup since the mutex was acquired.
   void NoteLookup() { ++mutex_.lookups_; }
   uint64_t lookups() const { return mutex_.lookups_; }
-  // Like NoteLookup, but first yields if this hold has reached kMaxLookupsPerHold.
+  // Like NoteLookup, but first yields if kMaxLookupsPerHold is reached.
   void NoteLookupOrYield() {
     if (lookups() >= kMaxLookupsPerHold) Yield();
     NoteLookup();
   }
 
-  void Afterwards(std::function<void()> task) { afterwards_.push_back(std::move(task)); }
+  void Defer(std::function<void()> task) { deferred_.push_back(std::move(task)); }
   // Defers a task that acquires the mutex again.
-  void AfterwardsLocked(std::function<void(Locked&)> task) {
-    Afterwards([&mutex = mutex_, task = std::move(task)] {
+  void DeferLocked(std::function<void(Locked&)> task) {
+    Defer([&mutex = mutex_, task = std::move(task)] {
       Locked again(mutex);
       task(again);
     });
@@ -200,13 +200,13 @@ class Locked {
   }
   template <typename T>
   void Discard(std::shared_ptr<T> object) {
-    if (object != nullptr) afterwards_.push_back([kept = std::move(object)] {});
+    if (object != nullptr) deferred_.push_back([kept = std::move(object)] {});
   }
 
  private:
   FairMutex& mutex_;
   bool is_held_ = false;
-  std::vector<std::function<void()>> afterwards_;
+  std::vector<std::function<void()>> deferred_;
 };
 
 // A task that runs with the mutex held.

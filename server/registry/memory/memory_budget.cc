@@ -121,9 +121,9 @@ void MemoryCharge::Set(uint64_t bytes) {
 
 void MemoryBudget::Evict(Locked& owners) {
   HULLD_CHECK(owners.Holds(owners_));
-  const size_t most = std::min(kMaxVisited, used_.size());
-  for (size_t visited = 0; visited < most && !used_.empty() && Statistics().bytes > limit_bytes_;
-       ++visited) {
+  const size_t max_visited = std::min(kMaxVisited, used_.size());
+  for (size_t visited = 0;
+       visited < max_visited && !used_.empty() && Statistics().bytes > limit_bytes_; ++visited) {
     Account& account = *used_.back();
     used_.splice(used_.begin(), used_, account.place_);
     const uint64_t before = Statistics().bytes;
@@ -136,14 +136,13 @@ absl::Status MemoryBudget::Check(Locked& owners, MemoryUse use) {
   Evict(owners);
   if (!IsOver(use)) return absl::OkStatus();
   const MemoryStatistics now = Statistics();
-  const std::string what =
-      use == MemoryUse::kReading
-          ? absl::StrCat(
-                "readers use ", now.reading_bytes,
-                " bytes of memory for hulls in use, streams, and watches, more than their share")
-          : absl::StrCat(
-                "writers use ", now.writing_bytes,
-                " bytes of memory for changing hulls and points in flight, more than their share");
+  const std::string what = use == MemoryUse::kReading
+                               ? absl::StrCat("readers use ", now.reading_bytes,
+                                              " bytes of memory for hulls in use, streams, and "
+                                              "watches, which exceeds their share")
+                               : absl::StrCat("writers use ", now.writing_bytes,
+                                              " bytes of memory for hulls being changed and points "
+                                              "in flight, which exceeds their share");
   return Overloaded(what, share(use), "memory-limit", kRetry);
 }
 

@@ -89,7 +89,7 @@ class MemoryBudget {
     // Touch marks the account as just used, Age as the first to evict from. Cost: O(1).
     void Touch();
     void Age();
-    // Sets the parts held. Former parts stop counting unless readers hold them. Cost: O(parts).
+    // Sets the parts held. Previous parts stop counting unless readers hold them. Cost: O(parts).
     void Hold(MemoryParts parts);
     const std::shared_ptr<const MemoryParts>& parts() const { return parts_; }
     // Empties the account; the budget may be destroyed afterwards.

@@ -100,7 +100,7 @@ void PeerSync::StartFetch(std::function<void(const absl::Status&)> done) {
   Locked locked(state_.mutex);
   committer_.StartBarrier(locked,
                           [done = std::move(done)](Locked& later, const absl::Status& status) {
-                            later.Afterwards([done, status] { done(status); });
+                            later.Defer([done, status] { done(status); });
                           });
 }
 
@@ -114,7 +114,7 @@ Committer::Barrier PeerSync::RunOrRefuse(Refusal refuse, LockedTask next) {
   return [refuse = std::move(refuse), next = std::move(next)](Locked& locked,
                                                               const absl::Status& status) {
     if (status.ok()) return next(locked);
-    locked.Afterwards([refuse, status] { refuse(status); });
+    locked.Defer([refuse, status] { refuse(status); });
   };
 }
 

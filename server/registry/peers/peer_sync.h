@@ -34,8 +34,8 @@ namespace hulld::server {
 // other functions acquire it.
 class PeerSync : public Committer::Peers {
  public:
-  // Maximum number of hulls that grow by peer servers' points within one hold of the mutex, and of
-  // their points in total; takes a few milliseconds.
+  // Maximum number of hulls that grow by peer servers' points in one critical section, and of their
+  // points in total; takes a few milliseconds.
   static constexpr size_t kMaxGrownHulls = 1 << 10;
   static constexpr uint64_t kMaxGrowth = 1 << 16;
 
@@ -44,7 +44,7 @@ class PeerSync : public Committer::Peers {
   PeerSync(const PeerSync&) = delete;
   PeerSync& operator=(const PeerSync&) = delete;
 
-  // True if a peer server may change an ID before a submitted change of it commits; the change is
+  // True if a peer server may change an ID before a change submitted here commits; that change is
   // then retried.
   bool has_peers() const { return feed_ != nullptr; }
 
@@ -69,18 +69,18 @@ class PeerSync : public Committer::Peers {
   std::optional<std::chrono::nanoseconds> TryFresh(const Freshness& freshness);
   std::optional<std::chrono::nanoseconds> TryFresh(Locked& locked, const Freshness& freshness);
   // Blocks until TryFresh succeeds and returns its result. FAILED_PRECONDITION: the store has not
-  // assigned that revision. Other errors as AwaitPeers. Cost: a store query only if the registry is
-  // too stale.
+  // assigned that revision. Other errors: see AwaitPeers. Cost: a store query, only if the registry
+  // is too stale.
   absl::StatusOr<std::chrono::nanoseconds> AwaitFresh(const Freshness& freshness,
                                                       const std::function<bool()>& should_stop);
   absl::StatusOr<std::chrono::nanoseconds> AwaitFresh(Locked& locked, const Freshness& freshness,
                                                       const std::function<bool()>& should_stop);
   // Requests the changes committed by peer servers so far and calls `done` exactly once after they
-  // are applied, on this or another thread, without holding a lock. Errors and cost as AwaitPeers,
-  // without blocking.
+  // are applied, on this or another thread, without holding a lock. Does not block. Errors and
+  // cost: see AwaitPeers.
   void StartFetch(std::function<void(const absl::Status&)> done);
-  // Runs `next`, which determines the answer to a call, after the changes committed by peer servers
-  // so far are applied; or calls `refuse` with the error, without holding a lock.
+  // Runs `next`, which determines the answer to a call, once all changes that peer servers have
+  // committed so far are applied. On an error, calls `refuse` without holding a lock.
   void WhenFresh(Refusal refuse, LockedTask next);
   // Returns a function that runs `next`, or calls `refuse` with the error, without holding a lock.
   static Committer::Barrier RunOrRefuse(Refusal refuse, LockedTask next);
@@ -89,8 +89,8 @@ class PeerSync : public Committer::Peers {
   // Requires has_peers().
   void Defer(LockedTask task);
 
-  // Returns the hulls in memory that only grew, up to the limits of a single hold of the mutex. The
-  // committed state does not change before Apply, because the same thread calls both.
+  // Returns the hulls in memory that only grew, up to kMaxGrownHulls and kMaxGrowth. The committed
+  // state does not change before Apply, because the same thread calls both.
   std::vector<HullGrowth> GrownHulls(const PeerChanges& changes) const override;
   void Apply(Locked& locked, const PeerChanges& changes) override;
   void NoteSynced(SteadyClock::time_point queried_at) override { synced_at_ = queried_at; }

@@ -189,7 +189,7 @@ void HullReader::NoteView(Locked& locked, const HullPointer& hull, KnownHulls& h
   if (!was_missing) ++(was_loaded ? state_.statistics.misses : state_.statistics.hits);
   known.view = HullView{hull->committed().record, hull->Serve()};
   known.bytes = hull->shared_bytes();
-  // Serve counted its parts.
+  // Serve has updated the hull's memory account.
   hull->NoteRead();
   if (was_missing || was_loaded) {
     state_.memory.Evict(locked);

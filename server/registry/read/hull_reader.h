@@ -22,11 +22,11 @@ namespace hulld::server {
 
 // Returns hulls ready to be served, all at one revision.
 //
-// A read looks up kMaxLookupsPerHold hulls per hold of the mutex and releases it in between. At
-// the end, it looks up the hulls that have changed since, until one hold covers all that remain:
-// all hulls are then at one revision. This terminates, because a commit takes longer than a lookup.
-// Readers and writers never wait for each other: a reader gets the version of the committed state,
-// created in O(1), and never uses a builder.
+// A read releases the mutex after every kMaxLookupsPerHold lookups. At the end, it looks up the
+// hulls that have changed since, until all that remain fit into one critical section: all hulls are
+// then at one revision. This terminates, because a commit takes longer than a lookup. Readers and
+// writers never wait for each other: a reader gets the version of the committed state, created in
+// O(1), and never uses a builder.
 //
 // A read waits only for the store: for the record of an unknown hull (RecordReader), and for points
 // that are not in memory. One reader loads a hull for all that request it

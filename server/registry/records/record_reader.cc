@@ -21,7 +21,7 @@ constexpr size_t kMaxAtOnce = kMaxLookupsPerHold;
 constexpr size_t kMaxThreads = 2;
 
 // The store reported an older revision than `queried_at`, its revision before the query.
-absl::Status WentBack(uint64_t found, uint64_t queried_at) {
+absl::Status RolledBack(uint64_t found, uint64_t queried_at) {
   return absl::UnavailableError(absl::StrCat(
       "the store is at revision ", found, " but was at ", queried_at,
       " earlier: it was restored to an earlier state, or another database is answering"));
@@ -210,7 +210,7 @@ void RecordReader::WhenReached(Locked& locked, uint64_t queried_at, const Found&
                                Committer::Barrier take) {
   if (!found->ok()) return take(locked, found->status());
   const uint64_t revision = (*found)->revision;
-  if (revision < queried_at) return take(locked, WentBack(revision, queried_at));
+  if (revision < queried_at) return take(locked, RolledBack(revision, queried_at));
   if (!IsBehind(locked, **found)) return take(locked, absl::OkStatus());
   // After this round of the committer, the registry includes everything that the store contained.
   committer_.AddBarrier(

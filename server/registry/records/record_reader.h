@@ -29,8 +29,8 @@ namespace hulld::server {
 inline constexpr ClientId kRecordReader = {1};
 inline constexpr ClientId kWatchReader = {2};
 
-// Reads records from a store that finds records, only some of which are in memory: loads the
-// record of an ID into the tables (of the hull or of the body, or the absence of both), and lists
+// Reads records from a store that supports record lookup, only some of which are in memory. Loads
+// the record of an ID into the tables (its hull, its body, or the absence of both), and lists
 // records page by page without adding them to the tables.
 //
 // Invariants:
@@ -54,12 +54,12 @@ class RecordReader final : public PageSource {
   RecordReader(const RecordReader&) = delete;
   RecordReader& operator=(const RecordReader&) = delete;
 
-  // The state of an ID that a task requires. kLife: known, and no change of a body and no creation
-  // or end of a hull is in flight. kQuiet: known, and nothing is in flight.
+  // The state of an ID that a task requires. kLife: the ID is known, and no change of a body, and
+  // no creation or end of a hull, is in flight. kQuiet: the ID is known, and nothing is in flight.
   enum class For { kLife, kQuiet };
-  // Runs `task` when the changes committed by peer servers so far are applied and the ID is in that
-  // state; or refuses, without the mutex. The task may run again by `again`, which waits in the
-  // same way.
+  // Runs `task` once all changes that peer servers have committed so far are applied and the ID is
+  // in that state. On an error, calls `refuse` without the mutex. The task may call `again` to wait
+  // for the same conditions and run again.
   using Task = std::function<void(Locked& locked, const LockedTask& again)>;
   void WhenReady(const std::string& id, For need, Refusal refuse, Task task);
 
@@ -81,8 +81,8 @@ class RecordReader final : public PageSource {
 
   // Returns at most `page_size` hulls, or bodies, or both, with IDs that start with `prefix` and
   // follow `after` in byte order; a page of bodies may contain fewer even if more follow. If the
-  // store finds records, queries the store, and must not run on a gRPC thread. UNAVAILABLE: the
-  // store cannot be read. CANCELLED: should_stop returned true.
+  // store supports record lookup, queries the store, and must not run on a gRPC thread.
+  // UNAVAILABLE: the store cannot be read. CANCELLED: should_stop returned true.
   absl::StatusOr<RecordPage> List(std::string prefix, std::string after, size_t page_size,
                                   const std::function<bool()>& should_stop = {},
                                   RecordKinds kinds = {.hulls = true});
@@ -91,7 +91,8 @@ class RecordReader final : public PageSource {
                 std::function<void(Locked&, absl::StatusOr<RecordPage>)> done) override;
 
  private:
-  // A read of a record. Its callers wait for the registry's mutex, with the error of the read.
+  // A read of a record, and the callbacks of those that wait for it. They are called with the
+  // registry's mutex held, and receive the error of the read.
   struct PendingRead {
     std::string id;
     std::vector<Committer::Barrier> waiting;
@@ -121,9 +122,9 @@ class RecordReader final : public PageSource {
                    const absl::Status& status);
   void TakeRecord(Locked& locked, const std::string& id, const FoundRecords& found);
 
-  // Calls `take`, now or on the committer's thread, when the records found are valid, or with an
-  // error, such as theirs. queried_at: the registry's revision at the time of the store query.
-  // UNAVAILABLE: the store went back, or cannot report the changes in between.
+  // Calls `take`, now or on the committer's thread, once the registry has reached the revision of
+  // the records found, or with an error. queried_at: the registry's revision at the time of the
+  // store query. UNAVAILABLE: the store was rolled back, or cannot report the changes in between.
   void WhenReached(Locked& locked, uint64_t queried_at, const Found& found,
                    Committer::Barrier take);
   bool IsBehind(const std::string& id, const absl::StatusOr<StoredHull>& stored) const;

@@ -43,11 +43,11 @@ RegistryState::RegistryState(Store& store_in, const Limits& limits_in,
       memory(limits.memory_limit, ReadersShare(limits.memory_limit, store), mutex),
       hulls(store.keeps_hulls(), memory),
       feed(store, mutex, memory, Config::kWatchMarkInterval),
-      is_cache_(store.finds_records()),
+      is_cache_(store.supports_lookup()),
       preparer_(std::in_place, 1, preparers) {
   if (!is_cache_) return;
-  hulls.KeepAtMost(MaxRecords(limits.memory_limit));
-  bodies.KeepAtMost(limits.memory_limit / kBodiesShare);
+  hulls.SetCapacity(MaxRecords(limits.memory_limit));
+  bodies.SetCapacity(limits.memory_limit / kBodiesShare);
 }
 
 HullPointer RegistryState::Find(const std::string& id) {
@@ -105,7 +105,7 @@ void RegistryState::Forget(Locked& locked, const HullPointer& hull, const absl::
   HULLD_CHECK(hull->state.gone());
   hulls.Erase(hull);
   for (auto& [number, on_gone] : hull->watches) {
-    locked.Afterwards([on_gone = std::move(on_gone), reason] { on_gone(reason); });
+    locked.Defer([on_gone = std::move(on_gone), reason] { on_gone(reason); });
   }
   hull->watches.clear();
   hull->DiscardAll(locked);
@@ -167,16 +167,16 @@ void RegistryState::SetTotals(const StoreTotals& totals) {
   kept_bodies_ = totals.bodies;
 }
 
-void RegistryState::ApplyCreation(Locked& locked, const HullPointer& former,
+void RegistryState::ApplyCreation(Locked& locked, const HullPointer& previous,
                                   const HullPointer& hull, const StoredHull& stored) {
   hull->SetStored(stored);
   std::optional<Incarnation> replaced;
-  if (former != nullptr) {
-    const HullRecord& record = former->committed().record;
+  if (previous != nullptr) {
+    const HullRecord& record = previous->committed().record;
     replaced = Incarnation::Of(record);
     hull->state.Commit();
     NoteVertices(record.vertex_count, 0);
-    Forget(locked, former, Gone(record.hull_id, "replaced"));
+    Forget(locked, previous, Gone(record.hull_id, "replaced"));
     hulls.Insert(hull);
   }
   NoteVertices(0, stored.record.vertex_count);
@@ -208,22 +208,22 @@ void RegistryState::ApplyChunk(Locked& locked, const HullPointer& hull, const Ch
 
 void RegistryState::ApplyBody(Locked& locked, const std::string& id,
                               const std::shared_ptr<const Body>& body, uint64_t revision) {
-  std::optional<Incarnation> former;
-  if (const auto known = FindBody(id)) former = Incarnation::Of(known->record());
+  std::optional<Incarnation> previous;
+  if (const auto known = FindBody(id)) previous = Incarnation::Of(known->record());
   // For readers that look for a hull with this ID.
   recent_changes.Note(id);
   bodies.Set(locked, id, body);
   if (body != nullptr) {
-    feed.NotePresent(locked, former, nullptr, body);
+    feed.NotePresent(locked, previous, nullptr, body);
   } else {
     --kept_bodies_;
-    feed.NoteDeleted(locked, id, *former, revision);
+    feed.NoteDeleted(locked, id, *previous, revision);
   }
 }
 
 HullPointer RegistryState::ApplyPeerChange(Locked& locked, const std::string& id,
                                            const PeerChange& change, uint64_t since) {
-  const std::optional<Incarnation> former = FindFormer(id, change, since);
+  const std::optional<Incarnation> previous = FindPrevious(id, change, since);
   const StoreTotals before = TotalsOf(id);
   HullPointer hull = hulls.Find(id);
   // False for changes that were part of the initial load.
@@ -232,7 +232,7 @@ HullPointer RegistryState::ApplyPeerChange(Locked& locked, const std::string& id
   // too.
   if (is_new) recent_changes.Note(id);
   if (hull == nullptr || !ApplyPeerVersion(locked, hull, change)) {
-    if (hull != nullptr) EndFormer(locked, hull, change);
+    if (hull != nullptr) EndPrevious(locked, hull, change);
     ApplyPeerBody(locked, id, change);
     if (change.hull.has_value()) {
       AddStored(id, *change.hull);
@@ -245,7 +245,7 @@ HullPointer RegistryState::ApplyPeerChange(Locked& locked, const std::string& id
     kept_bodies_ += now.bodies - before.bodies;
     NoteVertices(before.vertices, now.vertices);
   }
-  if (is_new) Note(locked, id, change, former);
+  if (is_new) Note(locked, id, change, previous);
   return hull;
 }
 
@@ -258,21 +258,21 @@ StoreTotals RegistryState::TotalsOf(const std::string& id) {
 
 // Returns the incarnation that had the ID after all changes up to `since`. If it is not known here,
 // the peer change supplies it.
-std::optional<Incarnation> RegistryState::FindFormer(const std::string& id,
-                                                     const PeerChange& change, uint64_t since) {
+std::optional<Incarnation> RegistryState::FindPrevious(const std::string& id,
+                                                       const PeerChange& change, uint64_t since) {
   if (IsKnown(id)) {
     if (const auto body = FindBody(id)) return Incarnation::Of(body->record());
     const HullPointer hull = hulls.Find(id);
     if (hull == nullptr) return std::nullopt;
     return Incarnation::Of(hull->committed().record);
   }
-  std::optional<Incarnation> former = change.former;
-  if (!former.has_value() && change.hull.has_value() && change.hull->ok()) {
-    former = Incarnation::Of((*change.hull)->record);
-  } else if (!former.has_value() && change.body.has_value() && change.body->ok()) {
-    former = Incarnation::Of((*change.body)->record);
+  std::optional<Incarnation> previous = change.previous;
+  if (!previous.has_value() && change.hull.has_value() && change.hull->ok()) {
+    previous = Incarnation::Of((*change.hull)->record);
+  } else if (!previous.has_value() && change.body.has_value() && change.body->ok()) {
+    previous = Incarnation::Of((*change.body)->record);
   }
-  return former.has_value() && former->create_revision <= since ? former : std::nullopt;
+  return previous.has_value() && previous->create_revision <= since ? previous : std::nullopt;
 }
 
 // Returns true if `change` is another version of the known hull, and applies it.
@@ -291,12 +291,13 @@ bool RegistryState::ApplyPeerVersion(Locked& locked, const HullPointer& hull,
 }
 
 // Ends the known hull, which was deleted or replaced.
-void RegistryState::EndFormer(Locked& locked, const HullPointer& former, const PeerChange& change) {
-  NoteChange(*former);
-  former->Vanish();
+void RegistryState::EndPrevious(Locked& locked, const HullPointer& previous,
+                                const PeerChange& change) {
+  NoteChange(*previous);
+  previous->Vanish();
   Forget(
-      locked, former,
-      Gone(former->committed().record.hull_id, change.hull.has_value() ? "replaced" : "deleted"));
+      locked, previous,
+      Gone(previous->committed().record.hull_id, change.hull.has_value() ? "replaced" : "deleted"));
 }
 
 void RegistryState::ApplyPeerBody(Locked& locked, const std::string& id, const PeerChange& change) {
@@ -311,17 +312,17 @@ void RegistryState::ApplyPeerBody(Locked& locked, const std::string& id, const P
 
 // Notes the change in the feed. Requires: the tables contain it.
 void RegistryState::Note(Locked& locked, const std::string& id, const PeerChange& change,
-                         const std::optional<Incarnation>& former) {
+                         const std::optional<Incarnation>& previous) {
   const std::shared_ptr<const Body> body = FindBody(id);
   const HullPointer hull = change.hull.has_value() ? hulls.Find(id) : nullptr;
   if (body != nullptr ? body->damage().ok() : hull != nullptr && !hull->state.damaged()) {
-    return feed.NotePresent(locked, former, hull, body);
+    return feed.NotePresent(locked, previous, hull, body);
   }
   const bool has_ended =
-      hull == nullptr && (body == nullptr || (former.has_value() && !former->is_body));
-  if (has_ended && (former.has_value() || change.ended_at == change.revision)) {
+      hull == nullptr && (body == nullptr || (previous.has_value() && !previous->is_body));
+  if (has_ended && (previous.has_value() || change.ended_at == change.revision)) {
     // A resumed watch may know a hull that was never known here.
-    const Incarnation ended = former.value_or(Incarnation{.create_revision = change.revision});
+    const Incarnation ended = previous.value_or(Incarnation{.create_revision = change.revision});
     feed.NoteDeleted(locked, id, ended, change.revision);
   } else {
     // A damaged record cannot be described.

@@ -30,10 +30,10 @@ namespace hulld::server {
 // committed change and notes it in the feed, which keeps the revision. Never blocks.
 //
 // Invariants:
-// - Revisions are applied in increasing order, and each change atomically, within one hold of the
-//   mutex.
-// - No ID is in both tables. If the store finds records, the tables are caches: an ID in neither is
-//   unknown (IsKnown). The known absence of both a hull and a body is an entry of the hull table.
+// - Revisions are applied in increasing order, and each change atomically, in one critical section.
+// - No ID is in both tables. If the store supports record lookup, the tables are caches: an ID in
+//   neither is unknown (IsKnown). The known absence of both a hull and a body is an entry of the
+//   hull table.
 // - The tables contain the last committed version of each known entry, of revision() or earlier.
 //   They also contain entries being created: a hull in kCreating, a body without a committed
 //   version.
@@ -99,8 +99,8 @@ class RegistryState {
 
   // Apply a committed change of a hull. Requires: its HullState no longer counts the change as in
   // flight.
-  // former: null if `hull` is in the table already; otherwise the hull that it replaces there.
-  void ApplyCreation(Locked& locked, const HullPointer& former, const HullPointer& hull,
+  // previous: null if `hull` is in the table already; otherwise the hull that it replaces there.
+  void ApplyCreation(Locked& locked, const HullPointer& previous, const HullPointer& hull,
                      const StoredHull& stored);
   void ApplyDeletion(Locked& locked, const HullPointer& hull, uint64_t revision);
   // mark, points: as for RegisteredHull::Commit.
@@ -149,13 +149,13 @@ class RegistryState {
   void PrepareIfWorn(const HullPointer& hull);
 
   StoreTotals TotalsOf(const std::string& id);
-  std::optional<Incarnation> FindFormer(const std::string& id, const PeerChange& change,
-                                        uint64_t since);
+  std::optional<Incarnation> FindPrevious(const std::string& id, const PeerChange& change,
+                                          uint64_t since);
   bool ApplyPeerVersion(Locked& locked, const HullPointer& hull, const PeerChange& change);
-  void EndFormer(Locked& locked, const HullPointer& former, const PeerChange& change);
+  void EndPrevious(Locked& locked, const HullPointer& previous, const PeerChange& change);
   void ApplyPeerBody(Locked& locked, const std::string& id, const PeerChange& change);
   void Note(Locked& locked, const std::string& id, const PeerChange& change,
-            const std::optional<Incarnation>& former);
+            const std::optional<Incarnation>& previous);
 
   const bool is_cache_;
   uint64_t vertex_count_ = 0;

@@ -30,7 +30,7 @@ struct WatchGroup {
     std::string id;
     ChangeFeed::Change change;
     // End of the previous incarnation; 0 if all watches reported it.
-    uint64_t former_end = 0;
+    uint64_t previous_end = 0;
 
     bool is_deletion() const { return change.kind == ChangeKind::kDeleted; }
   };
@@ -61,10 +61,10 @@ struct WatchGroup {
 void DeletionLog::Add(const std::string& id, uint64_t revision, bool was_body) {
   log_.push_back({revision, id, was_body});
   Last last{revision, was_body ? 0 : revision};
-  if (const auto former = last_.find(id); former != last_.end()) {
-    if (was_body) last.hull_revision = former->second.hull_revision;
-    // The new key outlives the former one.
-    last_.erase(former);
+  if (const auto previous = last_.find(id); previous != last_.end()) {
+    if (was_body) last.hull_revision = previous->second.hull_revision;
+    // The new key outlives the previous one.
+    last_.erase(previous);
   }
   last_.emplace(log_.back().id, last);
   if (log_.size() <= kCapacity) return;
@@ -120,7 +120,7 @@ void ChangeFeed::Begin(uint64_t revision, PageSource& pages) {
   deletions_.Begin(revision);
 }
 
-void ChangeFeed::NotePresent(Locked& locked, const std::optional<Incarnation>& former,
+void ChangeFeed::NotePresent(Locked& locked, const std::optional<Incarnation>& previous,
                              const HullPointer& hull, const std::shared_ptr<const Body>& body) {
   const HullRecord record = body != nullptr ? body->Describe().record : hull->committed().record;
   const Incarnation now = {record.create_revision, body != nullptr};
@@ -129,20 +129,20 @@ void ChangeFeed::NotePresent(Locked& locked, const std::optional<Incarnation>& f
                    .create_revision = record.create_revision,
                    .hull = hull,
                    .body = body};
-  change.kind = !former.has_value() ? ChangeKind::kCreated
-                : *former == now    ? ChangeKind::kChanged
-                                    : ChangeKind::kReplaced;
-  if (former.has_value() && former->is_body != now.is_body) {
-    change.other_kind_began = former->create_revision;
-    deletions_.Add(record.hull_id, change.revision, former->is_body);
+  change.kind = !previous.has_value() ? ChangeKind::kCreated
+                : *previous == now    ? ChangeKind::kChanged
+                                      : ChangeKind::kReplaced;
+  if (previous.has_value() && previous->is_body != now.is_body) {
+    change.other_kind_began = previous->create_revision;
+    deletions_.Add(record.hull_id, change.revision, previous->is_body);
   }
   Note(locked, record.hull_id, change);
 }
 
-void ChangeFeed::NoteDeleted(Locked& locked, const std::string& id, const Incarnation& former,
+void ChangeFeed::NoteDeleted(Locked& locked, const std::string& id, const Incarnation& previous,
                              uint64_t revision) {
-  deletions_.Add(id, revision, former.is_body);
-  Note(locked, id, {ChangeKind::kDeleted, former.is_body, revision, former.create_revision});
+  deletions_.Add(id, revision, previous.is_body);
+  Note(locked, id, {ChangeKind::kDeleted, previous.is_body, revision, previous.create_revision});
 }
 
 void ChangeFeed::NoteOther(const Locked& locked, uint64_t revision) {
@@ -197,13 +197,14 @@ void ChangeFeed::NoteFor(Locked& locked, const std::shared_ptr<WatchGroup>& grou
     auto node = changes.extract(std::exchange(place->second, revision));
     const bool was_deletion = node.mapped().is_deletion();
     if (was_deletion) --group->deletions;
-    if (was_deletion && change.kind == ChangeKind::kCreated) node.mapped().former_end = node.key();
+    if (was_deletion && change.kind == ChangeKind::kCreated)
+      node.mapped().previous_end = node.key();
     node.key() = revision;
     changes.insert(changes.end(), std::move(node));
   }
   WatchGroup::Pending& pending = changes.rbegin()->second;
   pending.change = change;
-  if (change.kind == ChangeKind::kReplaced) pending.former_end = revision;
+  if (change.kind == ChangeKind::kReplaced) pending.previous_end = revision;
   if (change.kind == ChangeKind::kDeleted) ++group->deletions;
 
   group->last_revision = revision;
@@ -214,7 +215,7 @@ void ChangeFeed::NoteFor(Locked& locked, const std::shared_ptr<WatchGroup>& grou
   }
   if (group->waiting == 0 || std::exchange(group->is_due, true)) return;
   due_.push_back(group);
-  if (due_.size() == 1) locked.Afterwards([this] { wake_.notify_one(); });
+  if (due_.size() == 1) locked.Defer([this] { wake_.notify_one(); });
 }
 
 // Returns a group to share, or a new one. Only watches of a prefix or a single hull are likely to
@@ -426,9 +427,9 @@ void ChangeFeed::AddChanges(Watch& watch, WatchBatch* batch) {
       revision = std::prev(next)->first;
       break;
     }
-    const auto& [id, change, former_end] = next->second;
+    const auto& [id, change, previous_end] = next->second;
     const bool was_known = change.create_revision <= before;
-    const bool another_ended = former_end > before;
+    const bool another_ended = previous_end > before;
     if (change.kind == ChangeKind::kDeleted) {
       if (was_synced && !was_known && !another_ended && !may_be_ahead) continue;
       batch->changes.push_back(DeletionOf(id, change.revision, change.is_body));
@@ -475,7 +476,7 @@ void ChangeFeed::Wake(Locked& locked, const std::shared_ptr<Watch>& watch) {
   HULLD_CHECK(locked.Holds(mutex_));
   if (!watch->is_waiting_) return;
   MakeReady(watch);
-  locked.Afterwards([this] { wake_.notify_one(); });
+  locked.Defer([this] { wake_.notify_one(); });
 }
 
 void ChangeFeed::Nudge(const std::shared_ptr<Watch>& watch) {

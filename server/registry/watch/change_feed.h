@@ -82,7 +82,7 @@ struct WatchTarget {
   bool lists_existing = true;
 };
 
-// A watch resumes after this revision of this store. 0: it does not resume.
+// The revision of a store after which a watch resumes; 0 if it does not resume.
 struct WatchPosition {
   uint64_t after_revision = 0;
   std::string store_id = {};
@@ -90,7 +90,7 @@ struct WatchPosition {
 
 // The next changes that a watch reports.
 struct WatchBatch {
-  // No change is pending; the watch's on_ready will be called once when one is.
+  // True if no change is pending. on_ready is then called once, when one arrives.
   bool waits = false;
   // Every change up to this revision was sent before, is in `changes`, or was superseded.
   uint64_t revision = 0;
@@ -192,10 +192,10 @@ class DeletionLog {
   bool IsFinal(const Deletion& deletion, bool bodies) const;
 
  private:
-  // The last deletion of an ID without a hull created since.
+  // The last deletion of an ID that no hull has reused since.
   struct Last {
     uint64_t revision;
-    // The last deletion of a hull since one was created; 0: none.
+    // The last deletion of a hull with this ID; 0 if only bodies were deleted.
     uint64_t hull_revision;
     bool is_body_now = false;
   };
@@ -225,7 +225,7 @@ class DeletionLog {
 // Thread-safe: guarded by the registry's mutex, which the Note functions require.
 class ChangeFeed {
  public:
-  // Maximum number of hulls visited or reported per hold of the mutex; takes about 50 us.
+  // Maximum number of hulls visited or reported before the mutex is released; takes about 50 us.
   static constexpr size_t kMaxPerBatch = 512;
 
   // All must outlive this. Pending changes are charged to the budget. mark_interval: the interval
@@ -244,13 +244,13 @@ class ChangeFeed {
   uint64_t revision() const { return revision_; }
 
   // Note a committed change at the revision of its record, or at `revision`. body: null for a
-  // change of a hull. former: the incarnation that had the ID before, possibly the same one;
+  // change of a hull. previous: the incarnation that had the ID before, possibly the same one;
   // nullopt: none. It is of the other kind if peer servers turned a hull into a body, or a body
   // into a hull, by several changes. Cost: O(log n) per group that includes the ID, and one hash
   // per length of a watched prefix.
-  void NotePresent(Locked& locked, const std::optional<Incarnation>& former,
+  void NotePresent(Locked& locked, const std::optional<Incarnation>& previous,
                    const HullPointer& hull, const std::shared_ptr<const Body>& body);
-  void NoteDeleted(Locked& locked, const std::string& id, const Incarnation& former,
+  void NoteDeleted(Locked& locked, const std::string& id, const Incarnation& previous,
                    uint64_t revision);
   // Notes a revision whose change cannot be described; only the revision is reported.
   void NoteOther(const Locked& locked, uint64_t revision);
@@ -289,8 +289,8 @@ class ChangeFeed {
     // Both null for a deletion.
     HullPointer hull = nullptr;
     std::shared_ptr<const Body> body = nullptr;
-    // If the change replaced a hull with a body or a body with a hull: create_revision of the
-    // former. Otherwise 0.
+    // create_revision of the previous incarnation if the change replaced a hull with a body, or a
+    // body with a hull; otherwise 0.
     uint64_t other_kind_began = 0;
   };
   friend struct WatchGroup;
@@ -338,7 +338,7 @@ class ChangeFeed {
   // Covers all pending changes.
   MemoryCharge charge_;
 
-  // Input of the thread.
+  // Work for the feed's thread.
   ConditionVariable wake_;
   Groups due_;
   std::vector<std::shared_ptr<Watch>> ready_;

@@ -18,9 +18,9 @@ namespace hulld::server {
 
 // A file system that tracks the committed part of each of RocksDB's write-ahead logs.
 //
-// After a failed write, the uncommitted rest of the log can be cut off: a refused change must not
-// appear when the log is replayed. A log that is cut while RocksDB has it open accepts no more
-// writes.
+// After a failed write, the uncommitted end of the log can be truncated, because a refused change
+// must not reappear when the log is replayed. A log that is truncated while RocksDB has it open
+// accepts no more writes.
 //
 // A mark (log_mark.h) records the committed part that is on disk, so that the next start detects a
 // log that lost some of it. The mark costs one write of 512 bytes to the page cache for each

@@ -16,7 +16,7 @@ namespace hulld::server {
 // server compares the logs with the mark before it opens the database, which replays and deletes
 // the logs.
 struct LogMark {
-  // The first bytes of a log.
+  // Size and checksum of a prefix of a log.
   struct Synced {
     uint64_t size = 0;
     uint32_t crc32 = 0;
@@ -24,7 +24,7 @@ struct LogMark {
     friend bool operator==(const Synced&, const Synced&) = default;
   };
 
-  // Number of writes of the mark; 0: none.
+  // Number of times that the mark was written.
   uint64_t generation = 0;
   // The store's last acknowledged revision.
   uint64_t revision = 0;

@@ -35,7 +35,7 @@ std::chrono::milliseconds UpTo(Clock::time_point end) {
 }  // namespace
 
 absl::StatusOr<uint64_t> LastBatch(Session& session) {
-  return OnlyNumber(session.Run("SELECT batch FROM hulld.store"));
+  return SingleNumber(session.Run("SELECT batch FROM hulld.store"));
 }
 
 BatchNotices::BatchNotices(Opener open, std::chrono::milliseconds retry,

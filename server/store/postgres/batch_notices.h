@@ -20,16 +20,16 @@ namespace hulld::server {
 absl::StatusOr<uint64_t> LastBatch(Session& session);
 
 // Notifications of new batches between the servers of a database (LISTEN and NOTIFY). A notice is
-// a hint with only the number of a batch: a server that receives it queries the store, a server
-// that does not receive it polls the store, and correctness does not depend on its arrival.
+// only a hint, and carries just the number of a batch. A server that receives it queries the store;
+// a server that misses it finds the batch by polling. Correctness does not depend on notices.
 //
 // A notice is sent after the commit, in a separate transaction that does not wait for the disk, and
 // notices within kMinPause are merged. NOTIFY within the transaction of the batch would save the
 // extra send, but PostgreSQL then holds a cluster-wide lock from before the commit until its log is
-// on disk, here and on synchronous standbys. The batches of a store are serialized anyway. But 8
-// writers that share only the cluster, such as 8 stores, dropped from 1460 commits a second to 430,
-// and with unmerged notices after each commit to 1090 (**observed**: means of 2 runs of pgbench 15,
-// 3 listeners, 2 cores, load 7).
+// on disk, here and on synchronous standbys. Within a store this makes no difference, because its
+// batches are serialized anyway. But with 8 writers that share only the cluster, such as 8 stores,
+// throughput dropped from 1460 commits per second to 430. One unmerged notice after each commit
+// lowered it to 1090 (**observed**: means of 2 runs of pgbench 15, 3 listeners, 2 cores, load 7).
 //
 // Uses one session, and a thread that listens and sends. A lost session is reopened after `retry`;
 // a database that refuses to listen, as some implementations of PostgreSQL's protocol do, is

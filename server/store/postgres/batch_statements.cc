@@ -43,7 +43,7 @@ void HullRows::Add(const Change& change) {
   if (change.deleted) return;
   if (change.writer.has_value()) sequences[change.writer->writer_id] = change.writer->sequence;
   if (change.vertex_change == VertexChange::kReplaced) {
-    drops_vertices = drops_vertices || !change.former_layout.empty();
+    drops_vertices = drops_vertices || !change.previous_layout.empty();
     base = &change;
     deltas.clear();
   } else if (change.vertex_change == VertexChange::kAdded) {
@@ -138,7 +138,7 @@ void AddRows(const std::string& hull_id, const HullRows& rows, Encoder& puts) {
 
 // Returns the create_revision of the incarnation that a change ends; 0: none. It is unknown for a
 // damaged hull; the value 1 then records that the hull existed, which peer servers need to know.
-uint64_t BeganOfEnded(const Change& change) {
+uint64_t CreateRevisionOfEnded(const Change& change) {
   const auto known = [](uint64_t revision) { return std::max<uint64_t>(revision, 1); };
   if (change.replaced.has_value()) return known(change.replaced->record.create_revision);
   if (!change.deleted) return 0;
@@ -193,7 +193,7 @@ StoreTotals AddedBy(std::span<const Change* const> changes) {
       added.vertices += vertices;
       if (change->replaced.has_value()) added.vertices -= change->replaced->record.vertex_count;
     } else {
-      added.vertices += vertices - change->former_vertices;
+      added.vertices += vertices - change->previous_vertices;
     }
   }
   return added;
@@ -238,7 +238,7 @@ std::vector<Statement> ListChanges(std::span<const Change* const> changes, uint6
   for (const Change* change : changes) {
     Row& row = rows[change->id()];
     row.revision = change->revision;
-    const uint64_t began = BeganOfEnded(*change);
+    const uint64_t began = CreateRevisionOfEnded(*change);
     if (began != 0 || change->deleted) row.ended_at = row.revision;
     if (row.began == 0) row.was_body = change->body != nullptr;
     if (row.began == 0) row.began = began;

@@ -23,8 +23,8 @@ std::vector<Statement> StatementsOf(std::span<const Change* const> changes);
 // of a shared store prepare.
 std::vector<Statement> ListChanges(std::span<const Change* const> changes, uint64_t batch);
 
-// Change of the store's totals by a batch, modulo 2^64. The vertices of a hull that ended with a
-// damaged record stay counted.
+// Returns the change that a batch makes to the store's totals, modulo 2^64. The vertices of a hull
+// that ended with a damaged record stay counted.
 StoreTotals AddedBy(std::span<const Change* const> changes);
 
 }  // namespace hulld::server

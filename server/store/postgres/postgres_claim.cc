@@ -25,7 +25,7 @@ absl::StatusOr<bool> PostgresStore::CheckFormat(Session& session) const {
   const absl::StatusOr<bool> exists = HasTable(session, "hulld.store");
   if (!exists.ok() || !*exists) return exists;
   HULLD_ASSIGN_OR_RETURN(const uint64_t number,
-                         OnlyNumber(session.Run("SELECT format FROM hulld.store")));
+                         SingleNumber(session.Run("SELECT format FROM hulld.store")));
   if (number != kFormat) return OtherFormat("the store", number, kFormat);
   const absl::StatusOr<bool> is_marked = HasTable(session, "hulld.migration");
   if (!is_marked.ok()) return is_marked;

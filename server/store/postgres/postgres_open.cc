@@ -90,7 +90,7 @@ constexpr char kTables[] = R"(
 
 // Settings of every session. The database aborts statements of a server that has disconnected, or
 // that stalls while it holds locks. The timeouts are not tuned, like those in session.cc, and are
-// shorter than PostgresOptions::answer_time. Every statement uses an index, even if its plan was
+// shorter than PostgresOptions::answer_timeout. Every statement uses an index, even if its plan was
 // made when the table was small.
 constexpr char kSettings[] = R"(
   SET search_path = '';
@@ -230,13 +230,13 @@ absl::Status PostgresStore::BecomeActive() {
   HULLD_RETURN_IF_ERROR(WaitForTurn());
   HULLD_RETURN_IF_ERROR(options_.shared ? MakeSharedSchema(*keeper_session_)
                                         : MakeSchema(*keeper_session_));
-  return BeginPatiently();
+  return BeginWithRetries();
 }
 
 // The connection has worked before, so a failure is treated as temporary: for example, the database
 // may refuse more sessions while those of killed servers still exist.
-absl::Status PostgresStore::BeginPatiently() {
-  const auto deadline = std::chrono::steady_clock::now() + options_.patience;
+absl::Status PostgresStore::BeginWithRetries() {
+  const auto deadline = std::chrono::steady_clock::now() + options_.retry_timeout;
   // Begin must not run twice: the store would appear not to have been closed.
   bool has_begun = false;
   for (auto pause = kMinLockPause;; pause = std::min(2 * pause, kMaxLockPause)) {
@@ -262,11 +262,12 @@ absl::Status PostgresStore::OpenFirstReaders() {
 
 absl::StatusOr<std::unique_ptr<Session>> PostgresStore::OpenSession(
     const std::string& settings) const {
-  absl::StatusOr<std::unique_ptr<Session>> session = Session::Open(conninfo_, options_.answer_time);
+  absl::StatusOr<std::unique_ptr<Session>> session =
+      Session::Open(conninfo_, options_.answer_timeout);
   if (!session.ok()) return session;
   const absl::Status set =
       (*session)
-          ->Run(absl::StrCat(kSettings, "SET lock_timeout = ", options_.lock_time.count(), ";",
+          ->Run(absl::StrCat(kSettings, "SET lock_timeout = ", options_.lock_timeout.count(), ";",
                              settings))
           .status();
   if (!set.ok()) return set;
@@ -280,20 +281,20 @@ absl::StatusOr<std::unique_ptr<Session>> PostgresStore::OpenWriter() const {
 }
 
 absl::StatusOr<std::unique_ptr<Session>> PostgresStore::OpenReader() const {
-  return OpenSession(absl::StrCat("SET statement_timeout = ", options_.answer_time.count(), ";",
+  return OpenSession(absl::StrCat("SET statement_timeout = ", options_.answer_timeout.count(), ";",
                                   kPrepareReads, options_.shared ? PrepareFetch() : ""));
 }
 
 // The database ends this session, and with it this server's claim, after several missed heartbeats.
 absl::StatusOr<std::unique_ptr<Session>> PostgresStore::OpenKeeper() const {
-  const auto patience = 10 * options_.heartbeat;
-  return OpenSession(absl::StrCat("SET statement_timeout = ", options_.answer_time.count(),
-                                  "; SET idle_session_timeout = ", patience.count()));
+  const auto idle_timeout = 10 * options_.heartbeat;
+  return OpenSession(absl::StrCat("SET statement_timeout = ", options_.answer_timeout.count(),
+                                  "; SET idle_session_timeout = ", idle_timeout.count()));
 }
 
 // Its transactions do not wait for the disk because notices need not be durable.
 absl::StatusOr<std::unique_ptr<Session>> PostgresStore::OpenListener() const {
-  return OpenSession(absl::StrCat("SET statement_timeout = ", options_.answer_time.count(),
+  return OpenSession(absl::StrCat("SET statement_timeout = ", options_.answer_timeout.count(),
                                   "; SET synchronous_commit = off"));
 }
 
@@ -340,15 +341,15 @@ absl::Status PostgresStore::MakeSchema(Session& session) {
 // Makes this server the owner of the store.
 absl::Status PostgresStore::Begin() {
   HULLD_RETURN_IF_ERROR(RenewWriter());
-  HULLD_ASSIGN_OR_RETURN(const Rows former, writer_->Run("SELECT store_id FROM hulld.store"));
+  HULLD_ASSIGN_OR_RETURN(const Rows previous, writer_->Run("SELECT store_id FROM hulld.store"));
   const std::string is_relaxed(1, durability_ == Durability::kRelaxed);
   const absl::Status claimed =
       Claim({.name = "hulld_claim", .parameters = {owner_, RandomId(), is_relaxed}}).status();
-  if (claimed.ok() && id_ != former.at(0, 0)) {
+  if (claimed.ok() && id_ != previous.at(0, 0)) {
     spdlog::warn(
         "store {} was open with synchronous_commit = off and not shut down cleanly; its last "
         "acknowledged changes may be lost; continuing at revision {} as store {}",
-        std::string(former.at(0, 0)), revision_, id_);
+        std::string(previous.at(0, 0)), revision_, id_);
   }
   return claimed;
 }

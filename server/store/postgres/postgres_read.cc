@@ -28,7 +28,7 @@ std::string EncodeBoolean(bool value) { return std::string(1, value ? '\1' : '\0
 
 // rows: the store's revision and, for each hull or body: ID, true for a body, true if the value is
 // omitted, and the value. A row without an ID means that none was found.
-absl::StatusOr<FoundRecords> FoundIn(const Rows& rows, std::string_view prefix, size_t most) {
+absl::StatusOr<FoundRecords> ParseRecords(const Rows& rows, std::string_view prefix, size_t limit) {
   if (rows.count() == 0) return absl::DataLossError("the row of hulld.store is missing");
   FoundRecords found;
   found.revision = rows.bigint(0, 0);
@@ -36,7 +36,7 @@ absl::StatusOr<FoundRecords> FoundIn(const Rows& rows, std::string_view prefix, 
     const std::string id(rows.at(i, 1));
     if (id.empty() || !id.starts_with(prefix)) break;
     const bool is_left_out = rows.at(i, 3) == EncodeBoolean(true);
-    found.more = is_left_out || found.hulls.size() + found.bodies.size() == most;
+    found.more = is_left_out || found.hulls.size() + found.bodies.size() == limit;
     if (found.more) break;
     if (rows.at(i, 2) == EncodeBoolean(true)) {
       found.bodies.emplace(id, UnsealStoredBody(id, rows.at(i, 4)));
@@ -123,22 +123,22 @@ absl::StatusOr<FoundRecords> PostgresStore::FindRecords(std::span<const std::str
   for (const std::string& id : ids) id_array.Add(id);
   HULLD_ASSIGN_OR_RETURN(const Rows rows,
                          ReadOne({.name = "hulld_find", .parameters = {id_array.Take()}}));
-  return FoundIn(rows, "", SIZE_MAX);
+  return ParseRecords(rows, "", SIZE_MAX);
 }
 
 // Requests one extra row to detect whether more follow. A prefix that no ID can have may contain
 // characters that the database rejects; the query then starts after all IDs.
 absl::StatusOr<FoundRecords> PostgresStore::ListRecords(const std::string& prefix,
-                                                        const std::string& after, size_t most,
+                                                        const std::string& after, size_t limit,
                                                         RecordKinds kinds) {
   const bool may_be = std::ranges::all_of(prefix, [](char c) { return c > ' ' && c <= '~'; });
   HULLD_ASSIGN_OR_RETURN(
       const Rows rows,
       ReadOne({.name = "hulld_list",
-               .parameters = {may_be ? prefix : "\x7f", after, EncodeBigint(most + 1),
+               .parameters = {may_be ? prefix : "\x7f", after, EncodeBigint(limit + 1),
                               EncodeBoolean(kinds.hulls), EncodeBoolean(kinds.bodies),
                               EncodeBigint(kMaxListedBytes)}}));
-  return FoundIn(rows, prefix, most);
+  return ParseRecords(rows, prefix, limit);
 }
 
 absl::StatusOr<std::vector<Vector>> PostgresStore::LoadVertices(const StoredHull& hull) {

@@ -97,7 +97,7 @@ Statement FetchStatement(uint64_t batch) {
 }
 
 // Returns the first incarnation that ended, if any. rows: the result of hulld_follow.
-std::optional<Incarnation> FormerIn(const Rows& rows, int row) {
+std::optional<Incarnation> ParseEnded(const Rows& rows, int row) {
   const auto began = [&](int column) {
     return rows.at(row, column).empty() ? UINT64_MAX : rows.bigint(row, column);
   };
@@ -163,7 +163,7 @@ absl::Status PostgresStore::CheckStore(const Rows& rows) {
         absl::UnavailableError("the store was restored to an earlier state and has a new ID; this "
                                "server exits; restart it to serve the restored store"));
   } else if (rows.bigint(0, 0) < batch_) {
-    went_back_ = true;
+    has_lost_batches_ = true;
     End(absl::UnavailableError(
         absl::StrCat("the database has lost ", batch_ - rows.bigint(0, 0),
                      " committed batches (failover to a lagging standby, or a restored backup); "
@@ -189,7 +189,7 @@ absl::Status PostgresStore::NotePeerChanges(const Rows& rows) {
     PeerChange& change = peer_changes_.by_id[id];
     change.revision = rows.bigint(i, 6);
     change.ended_at = std::max(change.ended_at, rows.bigint(i, 7));
-    if (!change.former.has_value()) change.former = FormerIn(rows, i);
+    if (!change.previous.has_value()) change.previous = ParseEnded(rows, i);
     change.hull.reset();
     change.body.reset();
     if (!rows.at(i, 8).empty()) {
@@ -227,7 +227,7 @@ absl::Status PostgresStore::Fetch() {
                          : follower_.Execute(std::span(&fetch, 1));
   if (rows.ok()) {
     const absl::Status noted = NotePeerChanges(rows->front());
-    if (went_back_) GiveNewId();
+    if (has_lost_batches_) AssignNewId();
     return noted;
   }
   ++read_failures_;
@@ -268,8 +268,8 @@ absl::Status PostgresStore::AttemptShared(std::span<Change* const> changes, Batc
 
 // Revisions already seen by clients will be assigned to other changes, so this is now a different
 // store.
-void PostgresStore::GiveNewId() {
-  went_back_ = false;
+void PostgresStore::AssignNewId() {
+  has_lost_batches_ = false;
   const absl::StatusOr<std::unique_ptr<Session>> session = OpenWriter();
   const absl::Status status =
       session.ok()
@@ -303,7 +303,7 @@ absl::Status PostgresStore::EndStuckTransactions() {
           "WHERE l.relation = 'hulld.store'::regclass AND l.mode = 'RowShareLock' AND l.granted "
           "AND a.datname = current_database() AND a.usename = current_user "
           "AND a.wait_event = 'ClientRead' AND a.state_change < now() - interval '",
-          options_.longest_send.count(), " ms'"))
+          options_.send_timeout.count(), " ms'"))
       .status();
 }
 

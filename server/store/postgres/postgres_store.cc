@@ -103,7 +103,7 @@ absl::Status PostgresStore::SendBatch(std::vector<Statement> statements, const B
 // committed, and ends with its session at the latest.
 void PostgresStore::EndTransaction(const absl::Status& status) {
   if (IsLost(status) || !writer_->Run("ROLLBACK").ok()) writer_ = nullptr;
-  if (went_back_) GiveNewId();
+  if (has_lost_batches_) AssignNewId();
 }
 
 // Returns true if the batch was committed. UNAVAILABLE: unknown at the deadline.
@@ -179,7 +179,7 @@ absl::StatusOr<bool> PostgresStore::OutcomeBeforePeers(uint64_t batch) {
 absl::Status PostgresStore::Commit(std::span<Change* const> changes) {
   HULLD_RETURN_IF_ERROR(ended());
   if (!unknown_.ok()) return unknown_;
-  const Clock::time_point deadline = Clock::now() + options_.patience;
+  const Clock::time_point deadline = Clock::now() + options_.retry_timeout;
   for (auto pause = kFirstRetryPause;; pause = std::min(2 * pause, kLongestRetryPause)) {
     // The outcome of the previous session is known.
     absl::Status status = writer_ == nullptr ? RenewWriter() : absl::OkStatus();

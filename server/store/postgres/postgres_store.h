@@ -24,12 +24,13 @@
 
 namespace hulld::server {
 
-// Pauses between attempts to reach the database: doubled from the first up to the longest.
+// Pauses between attempts to reach the database. The pause doubles from the first value to the
+// longest.
 inline constexpr std::chrono::milliseconds kFirstRetryPause{10};
 inline constexpr std::chrono::milliseconds kLongestRetryPause{500};
 
 struct PostgresOptions {
-  // Names the file of the connection string, for errors.
+  // The setting that names the file with the connection string, for error messages.
   static constexpr char kSetting[] = "--postgres-conninfo-file";
 
   // A connection string of libpq.
@@ -46,12 +47,12 @@ struct PostgresOptions {
   // Polled while this waits for the active server or for sessions; may be empty.
   std::function<bool()> should_stop;
   // Maximum wait of a statement for a lock.
-  std::chrono::milliseconds lock_time{15'000};
-  // Maximum silence of the database while an answer is due. Longer than lock_time.
-  std::chrono::milliseconds answer_time{30'000};
-  // Time for a commit that lost its session to determine its outcome or to retry; also the time for
+  std::chrono::milliseconds lock_timeout{15'000};
+  // Maximum silence of the database while an answer is due. Longer than lock_timeout.
+  std::chrono::milliseconds answer_timeout{30'000};
+  // Time limit for a commit that lost its session to determine its outcome or to retry, and for
   // Open to open the sessions after the first.
-  std::chrono::milliseconds patience{10'000};
+  std::chrono::milliseconds retry_timeout{10'000};
   // Interval at which this server checks that it is still active. The database considers the server
   // dead ten intervals after its last check.
   std::chrono::milliseconds heartbeat{1000};
@@ -62,7 +63,7 @@ struct PostgresOptions {
   std::chrono::milliseconds poll_interval{100};
   // Shared: maximum time that a session may hold the commit lock while the database waits for the
   // rest of its batch, for example because its server stalls. The session is then ended.
-  std::chrono::milliseconds longest_send{30'000};
+  std::chrono::milliseconds send_timeout{30'000};
 };
 
 // Stores hulls in the schema "hulld" of a PostgreSQL database (14 or later); see postgres_open.cc
@@ -116,10 +117,10 @@ class PostgresStore : public Store, public PeerFeed {
   void OnPeerCommit(std::function<void()> committed) override;
   absl::Status ForEachHull(const StoredHullVisitor& visit) override;
   absl::Status ForEachBody(const StoredBodyVisitor& visit) override;
-  bool finds_records() const override { return true; }
+  bool supports_lookup() const override { return true; }
   absl::StatusOr<FoundRecords> FindRecords(std::span<const std::string> ids) override;
   absl::StatusOr<FoundRecords> ListRecords(const std::string& prefix, const std::string& after,
-                                           size_t most, RecordKinds kinds) override;
+                                           size_t limit, RecordKinds kinds) override;
   StoreTotals totals() const override { return totals_; }
   absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull& hull) override;
   absl::StatusOr<uint64_t> LoadSequence(const HullRecord& hull,
@@ -141,8 +142,8 @@ class PostgresStore : public Store, public PeerFeed {
   // The epoch of this server, which only grows.
   uint64_t epoch() const { return epoch_.load(); }
 
-  // For a migration: the session of commits, and the statement of a transaction that commits
-  // nothing else than `added`, the change of the totals, and this revision.
+  // For a migration: the session that commits, and the statement that fences a transaction, sets
+  // the store's revision, and adds `added` to its totals.
   Session& writer() { return *writer_; }
   Statement Fence(uint64_t revision, const StoreTotals& added) const {
     return Fence({batch_, revision, added});
@@ -175,7 +176,7 @@ class PostgresStore : public Store, public PeerFeed {
   absl::Status CheckServer(Session& session);
   absl::Status WaitForTurn();
   absl::Status MakeSchema(Session& session);
-  absl::Status BeginPatiently();
+  absl::Status BeginWithRetries();
   absl::Status RenewWriter();
   absl::StatusOr<Rows> Claim(Statement claim);
   absl::Status Begin();
@@ -215,7 +216,7 @@ class PostgresStore : public Store, public PeerFeed {
   absl::Status Join();
   void Leave();
   absl::Status CheckStore(const Rows& rows);
-  void GiveNewId();
+  void AssignNewId();
   absl::Status NotePeerChanges(const Rows& rows);
   absl::Status AttemptShared(std::span<Change* const> changes, Batch* batch);
   absl::StatusOr<bool> SharedOutcome(uint64_t batch);
@@ -255,8 +256,8 @@ class PostgresStore : public Store, public PeerFeed {
   PeerChanges peer_changes_;
   // Shared: a started query for Fetch to finish; null: it must send one.
   std::unique_ptr<Session> fetching_;
-  // The database has lost batches.
-  bool went_back_ = false;
+  // True if the database has lost batches.
+  bool has_lost_batches_ = false;
   // Not OK: the outcome of batch_ + 1 is unknown.
   absl::Status unknown_;
 

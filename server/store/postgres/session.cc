@@ -124,7 +124,7 @@ std::string ViolatedConstraint(const absl::Status& status) {
 }
 
 absl::StatusOr<std::unique_ptr<Session>> Session::Open(const Conninfo& conninfo,
-                                                       std::chrono::milliseconds answer_time) {
+                                                       std::chrono::milliseconds answer_timeout) {
   std::vector<const char*> keywords;
   std::vector<const char*> values;
   for (const auto& [keyword, value] : conninfo) {
@@ -134,7 +134,7 @@ absl::StatusOr<std::unique_ptr<Session>> Session::Open(const Conninfo& conninfo,
   keywords.push_back(nullptr);
   values.push_back(nullptr);
   std::unique_ptr<Session> session(
-      new Session(PQconnectdbParams(keywords.data(), values.data(), 0), answer_time));
+      new Session(PQconnectdbParams(keywords.data(), values.data(), 0), answer_timeout));
   PGconn* const connection = session->connection_.get();
   if (PQstatus(connection) != CONNECTION_OK) {
     return session->Lost(absl::StrCat("cannot connect: ", OneLine(PQerrorMessage(connection))));
@@ -145,8 +145,8 @@ absl::StatusOr<std::unique_ptr<Session>> Session::Open(const Conninfo& conninfo,
   return session;
 }
 
-Session::Session(PGconn* connection, std::chrono::milliseconds answer_time)
-    : connection_(connection, PQfinish), answer_time_(answer_time) {}
+Session::Session(PGconn* connection, std::chrono::milliseconds answer_timeout)
+    : connection_(connection, PQfinish), answer_timeout_(answer_timeout) {}
 
 void Session::NoteWarning(void* session, const PGresult* result) {
   if (FieldOf(result, PG_DIAG_SEVERITY_NONLOCALIZED) == "WARNING") {
@@ -173,9 +173,9 @@ absl::Status Session::AwaitResult() {
     if (PQisBusy(connection) == 0) return absl::OkStatus();
     pollfd socket = {PQsocket(connection),
                      static_cast<short>(unsent > 0 ? POLLIN | POLLOUT : POLLIN), 0};
-    const int ready = poll(&socket, 1, static_cast<int>(answer_time_.count()));
+    const int ready = poll(&socket, 1, static_cast<int>(answer_timeout_.count()));
     if (ready < 0 && errno != EINTR) return Lost(std::strerror(errno));
-    if (ready == 0) return Lost(absl::StrCat("no answer for ", answer_time_.count(), " ms"));
+    if (ready == 0) return Lost(absl::StrCat("no answer for ", answer_timeout_.count(), " ms"));
     if (ready > 0 && (socket.revents & ~POLLOUT) != 0 && PQconsumeInput(connection) == 0) {
       return Lost(OneLine(PQerrorMessage(connection)));
     }
@@ -329,7 +329,7 @@ std::unique_ptr<Session> SessionPool::TryStart(std::span<const Statement> statem
   std::unique_ptr<Session> session;
   {
     const std::lock_guard lock(mutex_);
-    if (idle_.empty() || taken_ == most_) return nullptr;
+    if (idle_.empty() || taken_ == max_sessions_) return nullptr;
     ++taken_;
     session = std::move(idle_.back());
     idle_.pop_back();
@@ -343,7 +343,7 @@ absl::StatusOr<std::vector<Rows>> SessionPool::Finish(std::unique_ptr<Session> s
   absl::StatusOr<std::vector<Rows>> rows = session->Finish();
   for (const bool again : {true, false}) {
     const bool is_lost = IsLost(rows.status());
-    GiveBack(is_lost ? nullptr : std::move(session));
+    Return(is_lost ? nullptr : std::move(session));
     if (!is_lost || !again) break;
     HULLD_ASSIGN_OR_RETURN(session, Take(true));
     rows = session->Execute(statements);
@@ -356,7 +356,7 @@ absl::StatusOr<std::unique_ptr<Session>> SessionPool::Take(bool fresh) {
   std::vector<std::unique_ptr<Session>> old;
   {
     std::unique_lock lock(mutex_);
-    free_.wait(lock, [this] { return taken_ < most_; });
+    free_.wait(lock, [this] { return taken_ < max_sessions_; });
     ++taken_;
     if (fresh) old.swap(idle_);
     if (!idle_.empty()) {
@@ -366,12 +366,12 @@ absl::StatusOr<std::unique_ptr<Session>> SessionPool::Take(bool fresh) {
     }
   }
   absl::StatusOr<std::unique_ptr<Session>> session = open_();
-  if (!session.ok()) GiveBack(nullptr);
+  if (!session.ok()) Return(nullptr);
   return session;
 }
 
 // session: null if it is lost.
-void SessionPool::GiveBack(std::unique_ptr<Session> session) {
+void SessionPool::Return(std::unique_ptr<Session> session) {
   {
     const std::lock_guard lock(mutex_);
     --taken_;
@@ -380,7 +380,7 @@ void SessionPool::GiveBack(std::unique_ptr<Session> session) {
   free_.notify_one();
 }
 
-absl::StatusOr<uint64_t> OnlyNumber(const absl::StatusOr<Rows>& rows) {
+absl::StatusOr<uint64_t> SingleNumber(const absl::StatusOr<Rows>& rows) {
   if (!rows.ok()) return rows.status();
   uint64_t number = 0;
   if (rows->count() == 1 && absl::SimpleAtoi(std::string(rows->at(0, 0)), &number)) return number;

@@ -96,9 +96,9 @@ std::string ViolatedConstraint(const absl::Status& status);
 // operations fail in the same way.
 class Session {
  public:
-  // answer_time: maximum silence while an answer is due; the session is lost after it.
+  // answer_timeout: maximum silence while an answer is due; the session is lost after it.
   static absl::StatusOr<std::unique_ptr<Session>> Open(const Conninfo& conninfo,
-                                                       std::chrono::milliseconds answer_time);
+                                                       std::chrono::milliseconds answer_timeout);
 
   // Runs statements without parameters, separated by semicolons; returns the rows of the last, as
   // text.
@@ -127,7 +127,7 @@ class Session {
   std::string Describe() const;
 
  private:
-  Session(PGconn* connection, std::chrono::milliseconds answer_time);
+  Session(PGconn* connection, std::chrono::milliseconds answer_timeout);
   static void NoteWarning(void* session, const PGresult* result);
 
   absl::Status Lost(const std::string& what);
@@ -137,7 +137,7 @@ class Session {
   absl::Status ErrorOf(const PGresult* result);
 
   const std::unique_ptr<PGconn, decltype(&PQfinish)> connection_;
-  const std::chrono::milliseconds answer_time_;
+  const std::chrono::milliseconds answer_timeout_;
   absl::Status lost_;
   bool warned_ = false;
 };
@@ -147,8 +147,9 @@ class SessionPool {
  public:
   using Opener = std::function<absl::StatusOr<std::unique_ptr<Session>>()>;
 
-  // open: creates a session. most: maximum number of sessions; a thread waits if all are in use.
-  SessionPool(Opener open, int most) : open_(std::move(open)), most_(most) {}
+  // open: creates a session. max_sessions: a thread waits if this many are in use.
+  SessionPool(Opener open, int max_sessions)
+      : open_(std::move(open)), max_sessions_(max_sessions) {}
 
   // Session::Execute on one of the sessions. If it was lost since its last use, for example by a
   // restart of the database, retries once on a new one.
@@ -162,15 +163,15 @@ class SessionPool {
   absl::StatusOr<std::vector<Rows>> Finish(std::unique_ptr<Session> session,
                                            std::span<const Statement> statements);
   void Drop(std::unique_ptr<Session> session) {
-    if (session != nullptr) GiveBack(nullptr);
+    if (session != nullptr) Return(nullptr);
   }
 
  private:
   absl::StatusOr<std::unique_ptr<Session>> Take(bool fresh);
-  void GiveBack(std::unique_ptr<Session> session);
+  void Return(std::unique_ptr<Session> session);
 
   const Opener open_;
-  const int most_;
+  const int max_sessions_;
   std::mutex mutex_;
   std::condition_variable free_;
   // Guarded by mutex_.
@@ -179,7 +180,7 @@ class SessionPool {
 };
 
 // Returns the number in the only row of a query about the store. DATA_LOSS: the row is missing.
-absl::StatusOr<uint64_t> OnlyNumber(const absl::StatusOr<Rows>& rows);
+absl::StatusOr<uint64_t> SingleNumber(const absl::StatusOr<Rows>& rows);
 
 // Returns true if a table exists. name: as in "hulld.store".
 absl::StatusOr<bool> HasTable(Session& session, const std::string& name);

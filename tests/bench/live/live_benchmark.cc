@@ -148,7 +148,7 @@ class Run {
     const int max_steps = std::max(1, vertices_ / 2 / std::max(1, workload_.points));
     do {
       if (workload_.cold) {
-        AskCold(start.Vertices());
+        QueryCold(start.Vertices());
       } else {
         Grow(start, points, std::min(max_steps, 20000));
       }
@@ -195,7 +195,7 @@ class Run {
     moved_ += static_cast<double>(live.points_moved() - moved);
   }
 
-  void AskCold(std::vector<Vector> points) {
+  void QueryCold(std::vector<Vector> points) {
     Pose pose;
     pose.q = random_.Rotation();
     pose.t = OnSphere(1 + kProbeRadius + random_.Between(-0.1, 0.1));

@@ -47,9 +47,9 @@ class BulletMotion final : public MotionMethod {
   }
 
   Impact Find(size_t query) override {
-    const MotionSet::Query& asked = set_->queries[query];
+    const MotionSet::Query& pair = set_->queries[query];
     const Ends& ends = ends_[query];
-    Method method(shapes_[asked.hull_a].get(), shapes_[asked.hull_b].get());
+    Method method(shapes_[pair.hull_a].get(), shapes_[pair.hull_b].get());
     btConvexCast::CastResult result;
     if (!method.cast.calcTimeOfImpact(ends.a, ends.a, ends.start, ends.end, result)) return {};
     return {Impact::Verdict::kMeets, result.m_fraction};

@@ -55,9 +55,9 @@ class FclMotion final : public MotionMethod {
   };
 
   Impact FindOn(size_t query, const fcl::MotionBase<double>& a, const fcl::MotionBase<double>& b) {
-    const MotionSet::Query& asked = set_->queries[query];
+    const MotionSet::Query& pair = set_->queries[query];
     fcl::ContinuousCollisionResultd result;
-    fcl::continuousCollide<double>(shapes_[asked.hull_a].get(), &a, shapes_[asked.hull_b].get(), &b,
+    fcl::continuousCollide<double>(shapes_[pair.hull_a].get(), &a, shapes_[pair.hull_b].get(), &b,
                                    request_, result);
     if (!result.is_collide) return {};
     return {Impact::Verdict::kMeets, result.time_of_contact};

@@ -16,16 +16,16 @@ class HulldMotion final : public MotionMethod {
   void Prepare(const MotionSet& set) override { set_ = &set; }
 
   Impact Find(size_t query) override {
-    const MotionSet::Query& asked = set_->queries[query];
-    const QueryHull& a = set_->query_a(asked);
-    const QueryHull& b = set_->query_b(asked);
+    const MotionSet::Query& pair = set_->queries[query];
+    const QueryHull& a = set_->query_a(pair);
+    const QueryHull& b = set_->query_b(pair);
     MotionOptions options;
     if (resolution_ > 0) {
       options.max_time_error = resolution_;
       options.resolution = resolution_ * (a.max_abs_coordinate() + b.max_abs_coordinate());
     }
     const FirstContact contact =
-        *FindFirstContact({a, {asked.X_WA, asked.X_WA}}, {b, asked.X_WB}, options);
+        *FindFirstContact({a, {pair.X_WA, pair.X_WA}}, {b, pair.X_WB}, options);
     if (contact.relation == Relation::kSeparated) return {};
     if (!contact.contact_time) return {Impact::Verdict::kOpen};
     return {Impact::Verdict::kMeets, *contact.contact_time,

@@ -97,7 +97,7 @@ std::string FirstValue(PGconn* connection, const std::string& statement) {
 
 }  // namespace
 
-std::string AskDatabase(const std::string& conninfo, const std::string& statement) {
+std::string RunSql(const std::string& conninfo, const std::string& statement) {
   const std::unique_ptr<PGconn, decltype(&PQfinish)> connection(PQconnectdb(conninfo.c_str()),
                                                                 PQfinish);
   if (PQstatus(connection.get()) != CONNECTION_OK) Fail(PQerrorMessage(connection.get()));
@@ -128,7 +128,7 @@ std::string LibpqFloor::Value(const std::string& query) {
   return FirstValue(connection_.get(), query);
 }
 
-void LibpqFloor::Ask(const std::vector<Statement>& statements) {
+void LibpqFloor::Execute(const std::vector<Statement>& statements) {
   constexpr int kBinary = 1;
   PGconn* const connection = connection_.get();
   if (PQenterPipelineMode(connection) == 0) Fail(PQerrorMessage(connection));
@@ -185,7 +185,7 @@ LibpqFloor::Statement LibpqFloor::FetchPeerChanges() const {
 void LibpqFloor::Commit() {
   std::vector<Statement> statements = {{"BEGIN"}};
   if (shared_) {
-    Ask({{"BEGIN"}, {"turn"}, FetchPeerChanges()});
+    Execute({{"BEGIN"}, {"turn"}, FetchPeerChanges()});
     statements.clear();
   }
   ++batch_;
@@ -201,9 +201,9 @@ void LibpqFloor::Commit() {
     statements.push_back(Fence());
   }
   statements.push_back({"COMMIT"});
-  Ask(statements);
+  Execute(statements);
 }
 
-void LibpqFloor::Follow() { Ask({FetchPeerChanges()}); }
+void LibpqFloor::Follow() { Execute({FetchPeerChanges()}); }
 
 }  // namespace hulld::bench

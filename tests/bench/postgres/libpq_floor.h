@@ -32,7 +32,7 @@ class LibpqFloor {
 
   void Run(const std::string& text);
   std::string Value(const std::string& query);
-  void Ask(const std::vector<Statement>& statements);
+  void Execute(const std::vector<Statement>& statements);
   std::vector<Statement> Puts() const;
   Statement Fence() const;
   Statement FetchPeerChanges() const;
@@ -52,7 +52,7 @@ class LibpqFloor {
 
 // Runs one statement as a role that may create databases. Returns the first column of its first
 // row, or empty.
-std::string AskDatabase(const std::string& conninfo, const std::string& statement);
+std::string RunSql(const std::string& conninfo, const std::string& statement);
 
 }  // namespace hulld::bench
 

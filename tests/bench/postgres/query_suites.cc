@@ -26,12 +26,12 @@ namespace hulld::bench {
 namespace {
 
 // One client: its connection, and the queries that it cycles through.
-struct Asker {
+struct Caller {
   std::unique_ptr<v1::CollisionService::Stub> stub;
   std::vector<v1::CheckCollisionRequest> requests;
   size_t next = 0;
 };
-using Askers = std::vector<Asker>;
+using Callers = std::vector<Caller>;
 
 constexpr int kQueryHulls = 16;
 std::string QueryHull(uint64_t i) { return "queries/" + std::to_string(i % kQueryHulls); }
@@ -41,16 +41,16 @@ void MakeQueryHulls(const ChildServer& server) {
   for (int i = 0; i < kQueryHulls; ++i) MakeBallHull(*hulls, QueryHull(i), kVertices, 1);
 }
 
-Asker MakeAsker(const std::string& address, bool bounded, int seed) {
-  Asker asker;
-  asker.stub = v1::CollisionService::NewStub(ConnectAlone(address));
+Caller MakeCaller(const std::string& address, bool bounded, int seed) {
+  Caller caller;
+  caller.stub = v1::CollisionService::NewStub(ConnectAlone(address));
   std::mt19937_64 random(seed);
   std::uniform_real_distribution<double> unit(-1, 1);
   constexpr int kRequests = 256;
   // About one pair in three collides.
   constexpr double kHalfRoom = 1.3;
   for (int i = 0; i < kRequests; ++i) {
-    v1::CheckCollisionRequest& request = asker.requests.emplace_back();
+    v1::CheckCollisionRequest& request = caller.requests.emplace_back();
     for (v1::Placement* placement : {request.mutable_a(), request.mutable_b()}) {
       placement->set_hull_id(QueryHull(random()));
       v1::Quaternion* const q = placement->mutable_pose()->mutable_rotation();
@@ -66,35 +66,35 @@ Asker MakeAsker(const std::string& address, bool bounded, int seed) {
     constexpr int kBoundNanoseconds = 200'000'000;
     if (bounded) request.mutable_freshness()->mutable_max_staleness()->set_nanos(kBoundNanoseconds);
   }
-  return asker;
+  return caller;
 }
 
-Askers MakeAskers(const Arguments& arguments, const ChildServer& server, bool bounded) {
-  Askers askers;
+Callers MakeCallers(const Arguments& arguments, const ChildServer& server, bool bounded) {
+  Callers callers;
   for (int i = 0; i < arguments.clients; ++i) {
-    askers.push_back(MakeAsker(server.address(), bounded, i));
+    callers.push_back(MakeCaller(server.address(), bounded, i));
   }
-  return askers;
+  return callers;
 }
 
 // Returns microseconds.
-double Ask(Asker& asker, const v1::CheckCollisionRequest& request) {
+double Check(Caller& caller, const v1::CheckCollisionRequest& request) {
   grpc::ClientContext context;
   // Many connect concurrently.
   context.set_wait_for_ready(true);
   context.set_deadline(std::chrono::system_clock::now() + std::chrono::seconds(30));
   v1::CheckCollisionResponse response;
   const Clock::time_point start = Clock::now();
-  Require(asker.stub->CheckCollision(&context, request, &response), "CheckCollision");
+  Require(caller.stub->CheckCollision(&context, request, &response), "CheckCollision");
   return 1e6 * Since(start);
 }
 
-// Runs `ask` for each asker on a separate thread; returns all results.
-std::vector<double> OnThreads(size_t askers,
+// Runs `ask` for each caller on a separate thread; returns all results.
+std::vector<double> OnThreads(size_t callers,
                               const std::function<std::vector<double>(size_t)>& ask) {
-  std::vector<std::vector<double>> taken(askers);
+  std::vector<std::vector<double>> taken(callers);
   std::vector<std::thread> threads;
-  for (size_t i = 0; i < askers; ++i) {
+  for (size_t i = 0; i < callers; ++i) {
     threads.emplace_back([&, i] { taken[i] = ask(i); });
   }
   for (std::thread& thread : threads) thread.join();
@@ -103,25 +103,25 @@ std::vector<double> OnThreads(size_t askers,
   return all;
 }
 
-// Runs all askers concurrently, for a while.
-std::vector<double> AskAll(Askers& askers, double seconds) {
+// Runs all callers concurrently, for a while.
+std::vector<double> RunAll(Callers& callers, double seconds) {
   const Clock::time_point begin = Clock::now();
-  return OnThreads(askers.size(), [&](size_t i) {
-    Asker& asker = askers[i];
+  return OnThreads(callers.size(), [&](size_t i) {
+    Caller& caller = callers[i];
     std::vector<double> taken;
     while (Since(begin) < seconds) {
-      taken.push_back(Ask(asker, asker.requests[asker.next++ % asker.requests.size()]));
+      taken.push_back(Check(caller, caller.requests[caller.next++ % caller.requests.size()]));
     }
     return taken;
   });
 }
 
-// Askers are warmed up; each round takes this many seconds.
+// Callers are warmed up; each round takes this many seconds.
 Subject MakeSubject(const Arguments& arguments, const std::string& name, const ChildServer& server,
                     bool bounded, double seconds) {
-  const auto askers = std::make_shared<Askers>(MakeAskers(arguments, server, bounded));
-  AskAll(*askers, 0.5);
-  return {.name = name, .server = &server, .run = [=] { return AskAll(*askers, seconds); }};
+  const auto callers = std::make_shared<Callers>(MakeCallers(arguments, server, bounded));
+  RunAll(*callers, 0.5);
+  return {.name = name, .server = &server, .run = [=] { return RunAll(*callers, seconds); }};
 }
 
 }  // namespace
@@ -181,30 +181,30 @@ void MeasureBounded(const Arguments& arguments) {
 void MeasureCold(const Arguments& arguments) {
   const Stores stores(arguments);
   const int hulls =
-      std::stoi(AskDatabase(stores.Conninfo(kStartDatabase), "SELECT count(*) FROM hulld.hulls"));
+      std::stoi(RunSql(stores.Conninfo(kStartDatabase), "SELECT count(*) FROM hulld.hulls"));
   std::vector<int> order(hulls);
   std::iota(order.begin(), order.end(), 0);
   std::shuffle(order.begin(), order.end(), std::mt19937_64(1));
   const std::unique_ptr<ChildServer> server = stores.Start("many", kStartDatabase);
-  Askers askers = MakeAskers(arguments, *server, true);
-  // Each asker has its own pairs; none is repeated.
+  Callers callers = MakeCallers(arguments, *server, true);
+  // Each caller has its own pairs; none is repeated.
   const auto ask = [&](size_t i) {
     const Clock::time_point begin = Clock::now();
-    Asker& asker = askers[i];
+    Caller& caller = callers[i];
     std::vector<double> taken;
     while (Since(begin) < arguments.seconds / 4) {
-      const size_t pair = i + askers.size() * asker.next++;
+      const size_t pair = i + callers.size() * caller.next++;
       if (2 * pair + 1 >= order.size()) break;
-      v1::CheckCollisionRequest request = asker.requests[pair % asker.requests.size()];
+      v1::CheckCollisionRequest request = caller.requests[pair % caller.requests.size()];
       request.mutable_a()->set_hull_id(StartHull(order[2 * pair]));
       request.mutable_b()->set_hull_id(StartHull(order[2 * pair + 1]));
-      taken.push_back(Ask(asker, request));
+      taken.push_back(Check(caller, request));
     }
     return taken;
   };
   std::vector<Subject> subjects;
   subjects.push_back({.name = "many cold", .server = server.get(), .run = [&] {
-                        return OnThreads(askers.size(), ask);
+                        return OnThreads(callers.size(), ask);
                       }});
   const double before = server->ResidentMebibytes();
   RunRounds(subjects, arguments.seconds);

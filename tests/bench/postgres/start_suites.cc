@@ -49,14 +49,14 @@ void Fill(const Arguments& arguments) {
               arguments.from, arguments.from + count, count / Since(start),
               1e6 * (server->ProcessorSeconds() - used) / count,
               1e6 * (DatabaseSeconds() - database) / count);
-  AskDatabase(stores.Conninfo(kStartDatabase), "CHECKPOINT");
+  RunSql(stores.Conninfo(kStartDatabase), "CHECKPOINT");
 }
 
 void MeasureStarts(const Arguments& arguments) {
   constexpr int kStarts = 5;
   const Stores stores(arguments);
   const auto ask = [&](const char* statement) {
-    return AskDatabase(stores.Conninfo(kStartDatabase), statement);
+    return RunSql(stores.Conninfo(kStartDatabase), statement);
   };
   const double hulls = std::stod(ask("SELECT count(*) FROM hulld.hulls"));
   std::vector<double> listens, answers, resident, cpu;

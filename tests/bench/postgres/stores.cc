@@ -23,8 +23,8 @@ std::string Stores::Conninfo(const std::string& database) const {
 
 void Stores::Make(const std::string& database) const {
   const std::string admin = Conninfo("postgres");
-  AskDatabase(admin, "DROP DATABASE IF EXISTS " + database + " WITH (FORCE)");
-  AskDatabase(admin, "CREATE DATABASE " + database);
+  RunSql(admin, "DROP DATABASE IF EXISTS " + database + " WITH (FORCE)");
+  RunSql(admin, "CREATE DATABASE " + database);
 }
 
 std::unique_ptr<ChildServer> Stores::Start(const std::string& kind, const std::string& name) const {

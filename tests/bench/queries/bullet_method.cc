@@ -33,7 +33,7 @@ struct Bullet {
 
   // Uses its GJK alone; hulls that it fails to separate count as colliding, as in Bullet's own
   // detector.
-  Verdict Ask(const Placed& a, const Placed& b) {
+  Verdict Decide(const Placed& a, const Placed& b) {
     btGjkEpaSolver2::sResults results;
     const bool apart = btGjkEpaSolver2::Distance(a.shape, a.X, b.shape, b.X,
                                                  b.X.getOrigin() - a.X.getOrigin(), results);

@@ -23,7 +23,7 @@ struct Fcl {
   }
   Placed Place(const Shape& shape, const Pose& X_WA) { return {shape.get(), ToFcl(X_WA)}; }
 
-  Verdict Ask(const Placed& a, const Placed& b) {
+  Verdict Decide(const Placed& a, const Placed& b) {
     return solver.shapeIntersect(*a.shape, a.X, *b.shape, b.X, nullptr) ? Verdict::kColliding
                                                                         : Verdict::kApart;
   }

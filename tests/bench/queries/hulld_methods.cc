@@ -48,7 +48,7 @@ struct Hulld {
   Placed Place(const Shape& shape, const Pose& X_WA) {
     return OrFail(PlacedHull::Make(shape, X_WA));
   }
-  Verdict Ask(const Placed& a, const Placed& b) {
+  Verdict Decide(const Placed& a, const Placed& b) {
     return ToVerdict(CheckCollision(a, b, relation_alone)->relation);
   }
   std::optional<double> Depth(const Placed& a, const Placed& b) {
@@ -86,7 +86,7 @@ struct HulldSimplified {
     return std::make_unique<Shape>(hull, max_error);
   }
   Placed Place(const Shape& shape, const Pose& X_WA) { return hulld.Place(shape.query_hull, X_WA); }
-  Verdict Ask(const Placed& a, const Placed& b) { return hulld.Ask(a, b); }
+  Verdict Decide(const Placed& a, const Placed& b) { return hulld.Decide(a, b); }
   std::optional<double> Depth(const Placed& a, const Placed& b) { return hulld.Depth(a, b); }
   std::optional<double> Distance(const Placed& a, const Placed& b) { return hulld.Distance(a, b); }
 };

@@ -59,7 +59,7 @@ struct Libccd {
   // Each query is independent.
   static void Forget(const Placed& a, const Placed& b) { a.last = b.last = Shape::kNowhere; }
 
-  Verdict Ask(const Placed& a, const Placed& b) {
+  Verdict Decide(const Placed& a, const Placed& b) {
     static const ccd_t settings = Settings();
     Forget(a, b);
     const int colliding = algorithm == Algorithm::kMpr ? ccdMPRIntersect(&a, &b, &settings)

@@ -218,18 +218,18 @@ void FollowMotion(benchmark::State& state, Workload& workload, bool warm) {
   }
   size_t frame = 0;
   size_t cached = 0;
-  size_t asked = 0;
+  size_t answered = 0;
   for (auto _ : state) {
     const std::vector<PlacedHull>& b = frames[frame];
     for (size_t i = 0; i < b.size(); ++i) {
       const auto answer = CheckCollision(set.a[i], b[i], options, warm ? &caches[i] : nullptr);
       cached += answer->rung == Rung::kCached ? 1 : 0;
     }
-    asked += b.size();
+    answered += b.size();
     frame = (frame + 1) % frames.size();
   }
   ReportTime(state, set.queries.size());
-  state.counters["cached_share"] = static_cast<double>(cached) / static_cast<double>(asked);
+  state.counters["cached_share"] = static_cast<double>(cached) / static_cast<double>(answered);
 }
 
 double ProcessSeconds() {

@@ -50,7 +50,7 @@ class QueryMethod {
 // A method from a library with
 //   Shape, Placed: a hull, and a hull at a pose, in its own types;
 //   std::unique_ptr<Shape> MakeShape(const Hull&); Placed Place(const Shape&, const Pose&);
-//   Verdict Ask(const Placed&, const Placed&); and, if supported,
+//   Verdict Decide(const Placed&, const Placed&); and, if supported,
 //   std::optional<double> Depth(const Placed&, const Placed&), and Distance likewise.
 template <typename Library>
 class MethodOf final : public QueryMethod {
@@ -75,15 +75,15 @@ class MethodOf final : public QueryMethod {
 
   void Answer(size_t first, std::span<Verdict> verdicts) override {
     for (size_t i = 0; i < verdicts.size(); ++i) {
-      verdicts[i] = library_.Ask(a_[first + i], b_[first + i]);
+      verdicts[i] = library_.Decide(a_[first + i], b_[first + i]);
     }
   }
 
   void AnswerFromPoses(size_t first, std::span<Verdict> verdicts) override {
     for (size_t i = 0; i < verdicts.size(); ++i) {
       const QuerySet::Query& query = (*queries_)[first + i];
-      verdicts[i] = library_.Ask(library_.Place(*shapes_[query.hull_a], query.X_WA),
-                                 library_.Place(*shapes_[query.hull_b], query.X_WB));
+      verdicts[i] = library_.Decide(library_.Place(*shapes_[query.hull_a], query.X_WA),
+                                    library_.Place(*shapes_[query.hull_b], query.X_WB));
     }
   }
 

@@ -93,7 +93,7 @@ struct TextbookInDouble {
     }
   }
 
-  Verdict Ask(const Placed& a, const Placed& b) {
+  Verdict Decide(const Placed& a, const Placed& b) {
     Verdict verdict = Verdict::kColliding;
     VisitAxes(a, b, [&](const Vector& n) {
       const Interval on_a = Project(a.points, n);
@@ -169,7 +169,7 @@ struct PlainGjk {
     }
   };
 
-  static Verdict Ask(const Placed& a, const Placed& b) {
+  static Verdict Decide(const Placed& a, const Placed& b) {
     constexpr int kMaxSteps = 64;
     const Vector3 offset = (b.t - a.t).template cast<Scalar>();
     uint32_t last_a = ClimbingHull<Scalar>::kNowhere;

@@ -88,7 +88,7 @@ double Microseconds(Clock::duration duration) {
 }
 
 // Returns the time of a query, in microseconds.
-double Ask(v1::CollisionService::Stub& stub, const char* hull_id, int i) {
+double Check(v1::CollisionService::Stub& stub, const char* hull_id, int i) {
   v1::CheckCollisionRequest request;
   request.mutable_a()->set_hull_id(hull_id);
   request.mutable_b()->set_hull_id(kProbe);
@@ -116,7 +116,7 @@ void MeasureTurn(v1::CollisionService::Stub& stub, const char* hull_id,
   const auto start = Clock::now();
   for (int i = 0; i < kCallsPerTurn && Clock::now() - start < kMaxPerTurn; ++i) {
     before();
-    row->times.push_back(Ask(stub, hull_id, i));
+    row->times.push_back(Check(stub, hull_id, i));
   }
 }
 
@@ -174,8 +174,8 @@ void Measure(const std::string& program, int vertices) {
     const auto idle_stub = v1::CollisionService::NewStub(ConnectAlone(idle.address()));
     // warm up, until all worthwhile preparation is done
     for (int i = 0; i < 1000; ++i) {
-      Ask(*stub, kHull, i);
-      Ask(*idle_stub, kHull, i);
+      Check(*stub, kHull, i);
+      Check(*idle_stub, kHull, i);
     }
     for (int round = 0; round < kRounds; ++round) {
       const std::string number = std::to_string(round);
@@ -204,7 +204,7 @@ void Measure(const std::string& program, int vertices) {
     context.set_wait_for_ready(true);
     v1::ListHullsResponse page;
     Require(v1::HullService::NewStub(channel)->ListHulls(&context, {}, &page), "ListHulls");
-    cold.times.push_back(Ask(*v1::CollisionService::NewStub(channel), kHull, 0));
+    cold.times.push_back(Check(*v1::CollisionService::NewStub(channel), kHull, 0));
   }
   for (Row* row : {&rest, &after, &after_other, &beside, &other, &elsewhere, &alone, &cold})
     Print(vertices, row, &rest.times);

@@ -197,7 +197,7 @@ class Follower {
       }
       open.add_pairs(static_cast<uint32_t>(i));
     }
-    Ask(request);
+    Exchange(request);
   }
   ~Follower() {
     stream_->WritesDone();
@@ -213,11 +213,11 @@ class Follower {
     for (const double number : {1.0, 0.0, 0.0, 0.0, 0.9 + 1e-3 * (steps_ % 500), 0.0, 0.9}) {
       update.add_poses(number);
     }
-    Ask(request);
+    Exchange(request);
   }
 
  private:
-  void Ask(const v1::StreamCollisionsRequest& request) {
+  void Exchange(const v1::StreamCollisionsRequest& request) {
     if (!stream_->Write(request)) std::abort();
     v1::StreamCollisionsResponse part;
     do {

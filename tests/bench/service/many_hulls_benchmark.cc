@@ -84,7 +84,7 @@ class ManyHulls {
     }
     Print("create", start);
   }
-  void Ask(const char* step) {
+  void Query(const char* step) {
     const double start = ProcessorSeconds();
     {
       const absl::StatusOr<Resolved> resolved = registry_.Resolve(ids_, {});
@@ -145,12 +145,12 @@ class ManyHulls {
 int Run(Store& store, int hulls) {
   ManyHulls many(store, hulls);
   many.Create();
-  many.Ask("first query");
-  many.Ask("second query");
-  many.Ask("third query");
+  many.Query("first query");
+  many.Query("second query");
+  many.Query("third query");
   many.Idle("idle once");
   many.Idle("idle");
-  many.Ask("query after idle");
+  many.Query("query after idle");
   many.Idle("idle once");
   many.Idle("idle");
   many.Append();

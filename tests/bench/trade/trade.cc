@@ -32,10 +32,10 @@ double Median(std::vector<double> values) {
 template <typename Value>
 class Measurement {
  public:
-  using Ask = void (QueryMethod::*)(size_t first, std::span<Value> values);
+  using Query = void (QueryMethod::*)(size_t first, std::span<Value> values);
 
-  Measurement(QueryMethod* method, Ask ask, TradeQueries::Range range)
-      : method_(method), ask_(ask), range_(range), values_(range.count) {}
+  Measurement(QueryMethod* method, Query query, TradeQueries::Range range)
+      : method_(method), query_(query), range_(range), values_(range.count) {}
 
   const std::vector<Value>& values() const { return values_; }
   bool too_slow() const { return too_slow_; }
@@ -46,12 +46,12 @@ class Measurement {
   void RunFirst(double max_seconds) {
     const double start = ThreadSeconds();
     for (size_t i = 0; i < range_.count && !too_slow_; ++i) {
-      (method_->*ask_)(range_.first + i, std::span(values_).subspan(i, 1));
+      (method_->*query_)(range_.first + i, std::span(values_).subspan(i, 1));
       too_slow_ = ThreadSeconds() - start > max_seconds;
     }
     if (too_slow_) return;
     const double start_again = ThreadSeconds();
-    (method_->*ask_)(range_.first, values_);
+    (method_->*query_)(range_.first, values_);
     constexpr double kShortestRun = 2e-3;
     const double once = std::max(ThreadSeconds() - start_again, 1e-7);
     repetitions_ = std::clamp(static_cast<int>(kShortestRun / once), 1, 1000);
@@ -60,13 +60,13 @@ class Measurement {
   void Run() {
     if (too_slow_) return;
     const double start = ThreadSeconds();
-    for (int i = 0; i < repetitions_; ++i) (method_->*ask_)(range_.first, values_);
+    for (int i = 0; i < repetitions_; ++i) (method_->*query_)(range_.first, values_);
     seconds_.push_back((ThreadSeconds() - start) / repetitions_);
   }
 
  private:
   QueryMethod* method_;
-  Ask ask_;
+  Query query_;
   TradeQueries::Range range_;
   std::vector<Value> values_;
   bool too_slow_ = false;

@@ -347,7 +347,7 @@ TEST(CsvFile, RowsWithMoreCellsThanTheHeaderAreErrors) {
 }
 
 // The last row was read as 7 8 910.
-TEST(CsvFile, RowsThatALostLineEndJoinedAreErrors) {
+TEST(CsvFile, RowsJoinedByALostLineEndAreErrors) {
   for (const char* separator : {",", ";", "\t", " "}) {
     const auto read = [separator](const char* last) {
       return ReadText(

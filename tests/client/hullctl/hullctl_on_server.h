@@ -52,13 +52,13 @@ std::vector<Message> MessagesIn(const std::string& out) {
 // hullctl and a server, both within the test.
 class HullctlOnServer : public server::ServerTest {
  protected:
-  Ran Ask(std::vector<std::string> arguments) {
+  Ran Run(std::vector<std::string> arguments) {
     arguments.insert(arguments.end(), {"--server", server_->address()});
     return RunTool(arguments);
   }
-  Ran AskJson(std::vector<std::string> arguments) {
+  Ran RunJson(std::vector<std::string> arguments) {
     arguments.insert(arguments.end(), {"--output", "json"});
-    return Ask(arguments);
+    return Run(arguments);
   }
 };
 

@@ -53,14 +53,14 @@ class HullctlQueries : public HullctlOnServer {
 TEST_F(HullctlQueries, ValuesFromAListTakeAnyLetterCase) {
   const TempFile file("points", "1 2 3\n4 5 6\n");
   for (const std::string& name : PointFormatNames()) {
-    const Ran lower = Ask({"append", name, file.path(), "--create", "--format", name});
+    const Ran lower = Run({"append", name, file.path(), "--create", "--format", name});
     const Ran upper =
-        Ask({"append", name, file.path(), "--create", "--format", absl::AsciiStrToUpper(name)});
+        Run({"append", name, file.path(), "--create", "--format", absl::AsciiStrToUpper(name)});
     EXPECT_EQ(upper.code, lower.code) << upper.err;
     EXPECT_THAT(upper.err, Not(HasSubstr("is none of")));
   }
   const Ran ran =
-      Ask({"append", "cloud", file.path(), "--create", "--format", "Xyz", "--output", "JSON"});
+      Run({"append", "cloud", file.path(), "--create", "--format", "Xyz", "--output", "JSON"});
   EXPECT_EQ(ran.code, 0) << ran.err;
   EXPECT_THAT(ran.out, HasSubstr("\"opened\""));
 }
@@ -69,9 +69,9 @@ TEST_F(HullctlQueries, ValuesFromAListTakeAnyLetterCase) {
 TEST_F(HullctlQueries, OnlyCommandsWithAFormatOptionRecommendIt) {
   Put("cube", server::Cube());
   const TempFile file("part.step", "ISO-10303-21;\n");
-  EXPECT_THAT(Ask({"append", "cube", file.path()}).err,
+  EXPECT_THAT(Run({"append", "cube", file.path()}).err,
               HasSubstr("rgb; or set the format with --format\n"));
-  const Ran cover = Ask({"cover", "cube", file.path()});
+  const Ran cover = Run({"cover", "cube", file.path()});
   EXPECT_THAT(cover.err, HasSubstr("convert or rename the file; supported are obj, "));
   EXPECT_THAT(cover.err, Not(HasSubstr("--format")));
 }
@@ -80,36 +80,36 @@ TEST_F(HullctlQueries, VerifyDistinguishesValidInvalidAndUncheckable) {
   Put("cube", server::Cube());
   auto [request, response] = TouchingCubes();
   const TempFile valid("valid.json", Recorded(request, response));
-  Ran ran = Ask({"verify", valid.path()});
+  Ran ran = Run({"verify", valid.path()});
   EXPECT_EQ(ran.code, 0) << ran.err;
   EXPECT_EQ(ran.out, "TOUCHING: valid\n");
 
   response.set_relation(v1::RELATION_SEPARATED);
   const TempFile wrong("wrong.json", Recorded(request, response));
-  ran = Ask({"verify", wrong.path(), "--output", "json"});
+  ran = Run({"verify", wrong.path(), "--output", "json"});
   EXPECT_EQ(ran.code, 5);
   EXPECT_THAT(ran.out, HasSubstr("\"verdict\":\"INVALID\""));
   EXPECT_THAT(ran.err, HasSubstr("does not prove the answer: the direction does not separate"));
 
   response.set_relation(v1::RELATION_WITHIN_TOLERANCE);
   const TempFile tolerant("tolerant.json", Recorded(request, response));
-  EXPECT_EQ(Ask({"verify", tolerant.path()}).code, 6);
+  EXPECT_EQ(Run({"verify", tolerant.path()}).code, 6);
 
   response.set_relation(v1::RELATION_TOUCHING);
   response.mutable_hull_a()->set_store_id("another");
   response.mutable_hull_b()->set_store_id("another");
   const TempFile elsewhere("elsewhere.json", Recorded(request, response));
-  ran = Ask({"verify", elsewhere.path()});
+  ran = Run({"verify", elsewhere.path()});
   EXPECT_EQ(ran.code, 6);
   EXPECT_THAT(ran.err, HasSubstr("the server's store is not the one"));
 
   server::Appender appender(*hulls_, "cube", "w");
   ASSERT_TRUE(appender.Append(1, {9, 9, 9}).has_value());
-  ran = Ask({"verify", valid.path()});
+  ran = Run({"verify", valid.path()});
   EXPECT_EQ(ran.code, 6);
   EXPECT_THAT(ran.err, AllOf(HasSubstr("cannot be checked"), HasSubstr("is at revision")));
   ASSERT_TRUE(Delete("cube").ok());
-  ran = Ask({"verify", valid.path()});
+  ran = Run({"verify", valid.path()});
   EXPECT_EQ(ran.code, 6);
   EXPECT_THAT(ran.err, HasSubstr("was deleted"));
 }
@@ -122,21 +122,21 @@ TEST_F(HullctlQueries, MotionsShowTheirFirstContact) {
     more.insert(more.begin(), meets.begin(), meets.end());
     return more;
   };
-  Ran ran = Ask(meets);
+  Ran ran = Run(meets);
   EXPECT_EQ(ran.code, 0) << ran.err;
   EXPECT_THAT(ran.out, HasSubstr("relation         OVERLAPPING\n"));
   EXPECT_THAT(ran.out, HasSubstr("separated until  0.5\nfirst contact    0.5\n"));
-  EXPECT_THAT(Ask(with({"--verify"})).out, HasSubstr("verified         valid"));
-  EXPECT_EQ(Ask(with({"--output", "name"})).out, "OVERLAPPING\n");
-  EXPECT_THAT(AskJson(meets).out,
+  EXPECT_THAT(Run(with({"--verify"})).out, HasSubstr("verified         valid"));
+  EXPECT_EQ(Run(with({"--output", "name"})).out, "OVERLAPPING\n");
+  EXPECT_THAT(RunJson(meets).out,
               HasSubstr("\"firstContact\":{\"separatedUntil\":0.5,\"intervals\":[],"
                         "\"contactTime\":0.5}"));
-  ran = Ask(with({"--separation"}));
+  ran = Run(with({"--separation"}));
   EXPECT_EQ(ran.code, 2);
   EXPECT_THAT(ran.err,
               HasSubstr("--separation applies to a pose, but --to-a and --to-b define a motion"));
 
-  ran = Ask({"check", "cube", "cube", "--pose-b", "3,0,0", "--to-b", "2,0,0"});
+  ran = Run({"check", "cube", "cube", "--pose-b", "3,0,0", "--to-b", "2,0,0"});
   EXPECT_THAT(ran.out, HasSubstr("relation         SEPARATED\n"));
   EXPECT_THAT(ran.out, HasSubstr("separated until  1\n"));
   EXPECT_THAT(ran.out, Not(HasSubstr("first contact")));
@@ -145,7 +145,7 @@ TEST_F(HullctlQueries, MotionsShowTheirFirstContact) {
 TEST_F(HullctlQueries, MotionsTakeTheShorterPath) {
   Put("cube", server::Cube());
   const auto end_of = [this](const std::string& from, const std::string& to) {
-    const Ran ran = Ask({"check", "cube", "cube", "--pose-a", from, "--to-a", to, "--record", "-"});
+    const Ran ran = Run({"check", "cube", "cube", "--pose-a", from, "--to-a", to, "--record", "-"});
     EXPECT_EQ(ran.code, 0) << ran.err;
     v1::CheckCollisionRequest request;
     EXPECT_TRUE(ParseMember(ran.out, "request", &request).ok());
@@ -163,21 +163,21 @@ TEST_F(HullctlQueries, MotionsTakeTheShorterPath) {
 
 TEST_F(HullctlQueries, RecordedMotionsAreVerified) {
   Put("cube", server::Cube());
-  const Ran recorded = Ask({"check", "cube", "cube", "--pose-b", "3,0.25,0.5", "--to-b",
+  const Ran recorded = Run({"check", "cube", "cube", "--pose-b", "3,0.25,0.5", "--to-b",
                             "1,0,0,1,-1,0,0", "--max-time-error", "0.001", "--record", "-"});
   ASSERT_EQ(recorded.code, 0) << recorded.err;
   const TempFile valid("motion.json", recorded.out);
-  EXPECT_EQ(Ask({"verify", valid.path()}).out, "OVERLAPPING: valid\n");
+  EXPECT_EQ(Run({"verify", valid.path()}).out, "OVERLAPPING: valid\n");
   v1::CheckCollisionRequest request;
   v1::CheckCollisionResponse response;
   ASSERT_TRUE(ParseMember(recorded.out, "request", &request).ok());
   ASSERT_TRUE(ParseMember(recorded.out, "response", &response).ok());
   request.mutable_b()->mutable_end_pose()->mutable_translation()->set_x(-2);
   const TempFile other("other.json", Recorded(request, response));
-  EXPECT_EQ(Ask({"verify", other.path()}).code, 5);
+  EXPECT_EQ(Run({"verify", other.path()}).code, 5);
   response.clear_first_contact();
   const TempFile none("none.json", Recorded(request, response));
-  const Ran ran = Ask({"verify", none.path()});
+  const Ran ran = Run({"verify", none.path()});
   EXPECT_EQ(ran.code, 5);
   EXPECT_THAT(ran.err, HasSubstr("has no first contact"));
 }
@@ -188,60 +188,60 @@ TEST_F(HullctlQueries, CastListsHitsInOrderOfTime) {
   Put("far/behind", {-9, 0, 0});
   Put("near/point", {3, 0.5, 0.5});
   const std::string origin = "-1,0.5,0.5";
-  Ran ran = Ask({"cast", origin, "8,0,0"});
+  Ran ran = Run({"cast", origin, "8,0,0"});
   EXPECT_EQ(ran.code, 0) << ran.err;
   EXPECT_EQ(ran.out,
             "HULL        TIME   POINT      NORMAL\n"
             "near/cube   0.125  0 0.5 0.5  -1 0 0\n"
             "near/point  0.5    3 0.5 0.5  -1 0 0\n"
             "far/wall    0.625  4 0.5 0.5  -1 0 0\n");
-  EXPECT_EQ(Ask({"cast", origin, "4,0,0", "--output", "name"}).out, "near/cube\nnear/point\n");
-  EXPECT_EQ(Ask({"cast", origin, "8,0,0", "far/", "--output", "name"}).out, "far/wall\n");
-  EXPECT_EQ(AskJson({"cast", origin, "8,0,0", "near/c"}).out,
+  EXPECT_EQ(Run({"cast", origin, "4,0,0", "--output", "name"}).out, "near/cube\nnear/point\n");
+  EXPECT_EQ(Run({"cast", origin, "8,0,0", "far/", "--output", "name"}).out, "far/wall\n");
+  EXPECT_EQ(RunJson({"cast", origin, "8,0,0", "near/c"}).out,
             "{\"hullId\":\"near/cube\",\"time\":0.125,\"point\":[0,0.5,0.5],"
             "\"normal\":[-1,0,0]}\n");
   // A ray that starts in a hull meets no facet of it; one along an edge grazes it.
-  EXPECT_THAT(Ask({"cast", "0.5,0.5,0.5", "0,0,1", "near/c"}).out,
+  EXPECT_THAT(Run({"cast", "0.5,0.5,0.5", "0,0,1", "near/c"}).out,
               HasSubstr("near/cube  0     0.5 0.5 0.5  -\n"));
-  EXPECT_THAT(Ask({"cast", "-1,1,1", "8,0,0", "near/c"}).out, HasSubstr("near/cube  0.125"));
-  EXPECT_EQ(Ask({"cast", "-1,1,1.0000000000000002", "8,0,0", "near/c", "--output", "name"}).out,
+  EXPECT_THAT(Run({"cast", "-1,1,1", "8,0,0", "near/c"}).out, HasSubstr("near/cube  0.125"));
+  EXPECT_EQ(Run({"cast", "-1,1,1.0000000000000002", "8,0,0", "near/c", "--output", "name"}).out,
             "");
-  EXPECT_EQ(Ask({"cast", "1,2", "8,0,0"}).code, 2);
-  ran = Ask({"cast", "1e308,0,0", "1e308,0,0"});
+  EXPECT_EQ(Run({"cast", "1,2", "8,0,0"}).code, 2);
+  ran = Run({"cast", "1e308,0,0", "1e308,0,0"});
   EXPECT_EQ(ran.code, 2);
   EXPECT_THAT(ran.err, HasSubstr("ORIGIN + DIRECTION exceeds the largest double"));
-  EXPECT_EQ(Ask({"cast", origin, "8,0,0", "none/"}).out, "HULL  TIME  POINT  NORMAL\n");
+  EXPECT_EQ(Run({"cast", origin, "8,0,0", "none/"}).out, "HULL  TIME  POINT  NORMAL\n");
 }
 
 TEST_F(HullctlQueries, VerifyRefusesOtherFiles) {
   const TempFile no_json("no.json", "relation SEPARATED\n");
-  EXPECT_EQ(Ask({"verify", no_json.path()}).code, 2);
+  EXPECT_EQ(Run({"verify", no_json.path()}).code, 2);
   const TempFile no_request("bare.json", MessageJson(v1::CheckCollisionResponse()));
-  const Ran ran = Ask({"verify", no_request.path()});
+  const Ran ran = Run({"verify", no_request.path()});
   EXPECT_EQ(ran.code, 2);
   EXPECT_THAT(ran.err, AllOf(HasSubstr("no member \"request\""), HasSubstr("--record")));
-  EXPECT_EQ(Ask({"verify", "/no/such/file"}).code, 2);
+  EXPECT_EQ(Run({"verify", "/no/such/file"}).code, 2);
 }
 
 TEST_F(HullctlQueries, CheckVerifiesAtOnceAndRecordsForLater) {
   Put("cube", server::Cube());
   for (const char* pose : {"0.5,0,0", "1,0,0", "1,1,1", "3,0,0", "1,1,0,0,0,0,1"}) {
-    const Ran ran = Ask({"check", "cube", "cube", "--pose-b", pose, "--verify"});
+    const Ran ran = Run({"check", "cube", "cube", "--pose-b", pose, "--verify"});
     EXPECT_EQ(ran.code, 0) << ran.err;
     EXPECT_THAT(ran.out, HasSubstr("verified     valid\n"));
-    const Ran recorded = Ask({"check", "cube", "cube", "--pose-b", pose, "--record", "-"});
+    const Ran recorded = Run({"check", "cube", "cube", "--pose-b", pose, "--record", "-"});
     const TempFile file("answer.json", recorded.out);
-    EXPECT_EQ(Ask({"verify", file.path()}).code, 0) << recorded.out;
+    EXPECT_EQ(Run({"verify", file.path()}).code, 0) << recorded.out;
     const TempFile beside("beside.json", "");
     const Ran both =
-        AskJson({"check", "cube", "cube", "--pose-b", pose, "--record", beside.path()});
-    EXPECT_EQ(Ask({"verify", beside.path()}).code, 0);
+        RunJson({"check", "cube", "cube", "--pose-b", pose, "--record", beside.path()});
+    EXPECT_EQ(Run({"verify", beside.path()}).code, 0);
     const auto answers = MessagesIn<v1::CheckCollisionResponse>(both.out);
     ASSERT_EQ(answers.size(), 1U);
     EXPECT_TRUE(answers[0].has_certificate());
   }
   for (const char* option : {"--verify", "--certificate"}) {
-    const Ran json = AskJson({"check", "cube", "cube", option});
+    const Ran json = RunJson({"check", "cube", "cube", option});
     EXPECT_EQ(MessagesIn<v1::CheckCollisionResponse>(json.out).size(), 1U) << option;
   }
 }
@@ -272,7 +272,7 @@ TEST_F(HullctlQueries, EveryCertificateOfABatchIsValid) {
   constexpr uint32_t kSeed = 11;
   const TempFile file("scene", LatticeScene(kSeed, 90));
   for (const char* method : {"--axis", "--textbook"}) {
-    const Ran ran = Ask({"batch", file.path(), "--verify", method});
+    const Ran ran = Run({"batch", file.path(), "--verify", method});
     ASSERT_EQ(ran.code, 0) << "seed " << kSeed << ": " << ran.err;
     std::istringstream lines(ran.out);
     std::map<std::string, int> counts;
@@ -290,7 +290,7 @@ TEST_F(HullctlQueries, EveryCertificateOfABatchIsValid) {
     }
     EXPECT_EQ(total, 90 * 89 / 2);
     // Given as API messages, the answers are equal.
-    const Ran json = AskJson({"batch", file.path(), "--verify", method});
+    const Ran json = RunJson({"batch", file.path(), "--verify", method});
     ASSERT_EQ(json.code, 0) << json.err;
     uint64_t next = 0;
     for (const auto& part : MessagesIn<v1::BatchCheckCollisionsResponse>(json.out)) {
@@ -349,17 +349,17 @@ TEST_F(HullctlQueries, SceneFindsCollisions) {
       R"({"placements":[{"hullId":"cube"},{"hullId":"cube","pose":{"translation":{"x":1}}},
           {"hullId":"cube","pose":{"translation":{"x":2.25}}}])";
   const TempFile file("scene.json", placements + "}");
-  Ran ran = Ask({"scene", file.path()});
+  Ran ran = Run({"scene", file.path()});
   EXPECT_EQ(ran.code, 0) << ran.err;
   EXPECT_EQ(ran.out, "0:cube\t1:cube\tTOUCHING\n# touching 1 overlapping 0 failed 0\n");
-  ran = Ask({"scene", file.path(), "--output", "json"});
+  ran = Run({"scene", file.path(), "--output", "json"});
   EXPECT_EQ(ran.code, 0) << ran.err;
   v1::FindCollisionsResponse all;
   for (const auto& part : MessagesIn<v1::FindCollisionsResponse>(ran.out)) all.MergeFrom(part);
   EXPECT_THAT(all.pairs(), testing::ElementsAre(0, 1));
   EXPECT_EQ(all.totals().touching(), 1U);
   const TempFile clear("clear.json", placements + R"(,"wanted":{"clearance":0.25}})");
-  ran = Ask({"scene", clear.path()});
+  ran = Run({"scene", clear.path()});
   EXPECT_EQ(ran.code, 0) << ran.err;
   EXPECT_EQ(ran.out,
             "0:cube\t1:cube\tTOUCHING\twithin\n1:cube\t2:cube\tSEPARATED\twithin\n"
@@ -367,19 +367,19 @@ TEST_F(HullctlQueries, SceneFindsCollisions) {
   const TempFile packed("packed.json",
                         R"({"packedPlacements":{"hullIds":["cube"],"hulls":[0,0],
                             "poses":[1,0,0,0, 0,0,0,  1,0,0,0, 1,0,0]}})");
-  ran = Ask({"scene", packed.path()});
+  ran = Run({"scene", packed.path()});
   EXPECT_EQ(ran.code, 0) << ran.err;
   EXPECT_EQ(ran.out, "0:cube\t1:cube\tTOUCHING\n# touching 1 overlapping 0 failed 0\n");
   const TempFile typo("typo.json", R"({"placement":[]})");
-  ran = Ask({"scene", typo.path()});
+  ran = Run({"scene", typo.path()});
   EXPECT_EQ(ran.code, 2);
   EXPECT_THAT(ran.err, HasSubstr("placement"));
   const TempFile groups("groups.json", placements + R"(,"groups":[1]})");
-  ran = Ask({"scene", groups.path()});
+  ran = Run({"scene", groups.path()});
   EXPECT_EQ(ran.code, 1);
   EXPECT_THAT(ran.err, HasSubstr("groups has 1 groups for 3 placements"));
   const TempFile lost("lost.json", R"({"placements":[{"hullId":"nope"}]})");
-  ran = Ask({"scene", lost.path()});
+  ran = Run({"scene", lost.path()});
   EXPECT_EQ(ran.code, 4);
   EXPECT_THAT(ran.err, HasSubstr("placement 0:nope: hull \"nope\" not found"));
 }
@@ -393,12 +393,12 @@ TEST_F(HullctlQueries, StreamAnswersEachLineWithALine) {
                       "\n"
                       R"({"placements":[1],"poses":[2,0,0,0,1.5,0,0],"refreshHulls":true})"
                       "\n");
-  Ran ran = Ask({"stream", file.path()});
+  Ran ran = Run({"stream", file.path()});
   EXPECT_EQ(ran.code, 0) << ran.err;
   EXPECT_EQ(ran.out,
             "0\t0:cube\t1:cube\tOVERLAPPING\n1\t0:cube\t1:cube\tTOUCHING\n"
             "2\t0:cube\t1:cube\tSEPARATED\n");
-  ran = AskJson({"stream", file.path()});
+  ran = RunJson({"stream", file.path()});
   EXPECT_EQ(ran.code, 0) << ran.err;
   const auto answers = MessagesIn<v1::StreamCollisionsResponse>(ran.out);
   ASSERT_EQ(answers.size(), 3U);
@@ -423,19 +423,19 @@ TEST_F(HullctlQueries, EachCommandAcceptsEachSceneFormat) {
   const TempFile packed("packed", R"({"packedPlacements":{"hullIds":["cube"],"hulls":[0,0,0],
       "poses":[1,0,0,0,0,0,0, 1,0,0,0,1,0,0, 1,0,0,0,1.5,0,0]}})");
   for (const TempFile* file : {&yaml, &flow, &json, &packed}) {
-    Ran ran = Ask({"batch", file->path(), "--verify"});
+    Ran ran = Run({"batch", file->path(), "--verify"});
     EXPECT_EQ(ran.code, 0) << ran.err;
     EXPECT_THAT(ran.out, HasSubstr("# separated 1 touching 1 overlapping 1 failed 0\n"));
-    EXPECT_EQ(AskJson({"batch", file->path(), "--verify"}).code, 0);
-    ran = Ask({"scene", file->path()});
+    EXPECT_EQ(RunJson({"batch", file->path(), "--verify"}).code, 0);
+    ran = Run({"scene", file->path()});
     EXPECT_EQ(ran.code, 0) << ran.err;
     EXPECT_THAT(ran.out, HasSubstr("# touching 1 overlapping 1 failed 0\n"));
-    ran = Ask({"stream", file->path(), "--output", "name"});
+    ran = Run({"stream", file->path(), "--output", "name"});
     EXPECT_EQ(ran.code, 0) << ran.err;
     EXPECT_EQ(std::count(ran.out.begin(), ran.out.end(), '\n'), 3);
   }
   const TempFile pairs("pairs", "place: {a: {id: cube}, b: {id: cube}}\nask: {pairs: [[a, b]]}\n");
-  const Ran ran = Ask({"scene", pairs.path()});
+  const Ran ran = Run({"scene", pairs.path()});
   EXPECT_EQ(ran.code, 2);
   EXPECT_THAT(ran.err, HasSubstr("finds pairs itself, but the file names pairs"));
 }
@@ -445,16 +445,16 @@ TEST_F(HullctlQueries, StreamErrorsNameTheLineOrTheField) {
   const std::string open = R"({"placements":[{"hullId":"cube"},{"hullId":"nope"}],"pairs":[0,1]})"
                            "\n";
   const TempFile typo("typo.jsonl", open + "{\"placement\":[1]}\n");
-  Ran ran = Ask({"stream", typo.path()});
+  Ran ran = Run({"stream", typo.path()});
   EXPECT_EQ(ran.code, 2);
   EXPECT_THAT(ran.err, AllOf(HasSubstr(":2: "), HasSubstr("placement")));
   EXPECT_THAT(ran.out, HasSubstr("FAILED\thull \"nope\" not found\n"));
   const TempFile range("range.jsonl", open + R"({"placements":[7],"poses":[1,0,0,0,1,0,0]})");
-  ran = Ask({"stream", range.path()});
+  ran = Run({"stream", range.path()});
   EXPECT_EQ(ran.code, 1);
   EXPECT_THAT(ran.err, HasSubstr("update 1: placements[0] is 7"));
   const TempFile empty("empty.jsonl", "\n");
-  ran = Ask({"stream", empty.path()});
+  ran = Run({"stream", empty.path()});
   EXPECT_EQ(ran.code, 2);
   EXPECT_THAT(ran.err, HasSubstr("contains no scene"));
 }
@@ -462,7 +462,7 @@ TEST_F(HullctlQueries, StreamErrorsNameTheLineOrTheField) {
 TEST_F(HullctlQueries, AMissingFileIsReportedAlongWithTheMissingHull) {
   Put("cube", server::Cube());
   for (const char* name : {"part.stl", "part"}) {
-    const Ran ran = Ask({"check", name, "cube"});
+    const Ran ran = Run({"check", name, "cube"});
     EXPECT_EQ(ran.code, 1);
     EXPECT_EQ(ran.err, std::string("hullctl: hull \"") + name + "\" not found" +
                            (std::string(name) == "part" ? "" : ", and no such file") +
@@ -470,7 +470,7 @@ TEST_F(HullctlQueries, AMissingFileIsReportedAlongWithTheMissingHull) {
   }
   const std::string step = "hulld_" + std::to_string(getpid()) + ".step";
   std::ofstream(step) << "ISO-10303-21;\n";
-  const Ran ran = Ask({"check", step, "cube"});
+  const Ran ran = Run({"check", step, "cube"});
   std::filesystem::remove(step);
   EXPECT_THAT(ran.err, HasSubstr("\" not found; " + step + ": unknown file extension; convert"));
 }
@@ -478,7 +478,7 @@ TEST_F(HullctlQueries, AMissingFileIsReportedAlongWithTheMissingHull) {
 TEST_F(HullctlQueries, AMeshIsNotWrittenUnderTheNameOfAnotherFormat) {
   Put("cube", server::Cube());
   const std::string file = testing::TempDir() + "hulld_mesh.stl";
-  const Ran ran = Ask({"mesh", "cube", "-o", file});
+  const Ran ran = Run({"mesh", "cube", "-o", file});
   EXPECT_EQ(ran.code, 2);
   EXPECT_THAT(ran.err, HasSubstr("meshes are written as OBJ; choose a name that ends in .obj"));
   EXPECT_FALSE(std::filesystem::exists(file));
@@ -488,7 +488,7 @@ TEST_F(HullctlQueries, ConflictingOptionsAreExplained) {
   Put("cube", server::Cube());
   const auto usage = [this](std::vector<std::string> options, const std::string& problem) {
     options.insert(options.begin(), {"check", "cube", "cube"});
-    const Ran ran = Ask(options);
+    const Ran ran = Run(options);
     EXPECT_EQ(ran.code, 2) << ran.err;
     EXPECT_THAT(ran.err, HasSubstr(problem));
   };
@@ -501,20 +501,20 @@ TEST_F(HullctlQueries, ConflictingOptionsAreExplained) {
   usage({"--max-time-error", "0.1"}, "--max-time-error applies to a motion; add --to-a or --to-b");
   usage({"--resolution", "0.1"}, "--resolution applies to a motion");
   usage({"--textbook", "--radius-b", "1"}, "--textbook does not support radii; remove it or --rad");
-  EXPECT_EQ(Ask({"check", "cube", "cube", "--tolerance", "0", "--separation"}).code, 0);
-  Ran ran = Ask({"check", "cube", "cube", "--tolerance", "-1"});
+  EXPECT_EQ(Run({"check", "cube", "cube", "--tolerance", "0", "--separation"}).code, 0);
+  Ran ran = Run({"check", "cube", "cube", "--tolerance", "-1"});
   EXPECT_EQ(ran.code, 2);
   EXPECT_THAT(ran.err, HasSubstr("--tolerance: \"-1\" is not a length of at least 0"));
   for (const char* option : {"--clearance", "--max-error"}) {
-    EXPECT_EQ(Ask({"check", "cube", "cube", option, "nan"}).code, 2);
-    EXPECT_EQ(Ask({"check", "cube", "cube", option, "1e999"}).code, 2);
+    EXPECT_EQ(Run({"check", "cube", "cube", option, "nan"}).code, 2);
+    EXPECT_EQ(Run({"check", "cube", "cube", option, "1e999"}).code, 2);
   }
 }
 
 TEST_F(HullctlQueries, LoadReportsEveryModeAndLeavesNoHullBehind) {
   Put("cube", server::Cube());
   for (const char* mode : {"check", "batch", "append", "mixed"}) {
-    const Ran ran = Ask({"bench", "load", "--mode", mode, "--clients", "2", "--requests", "30",
+    const Ran ran = Run({"bench", "load", "--mode", mode, "--clients", "2", "--requests", "30",
                          "--pairs", "50", "--points", "40", "--hulls", "3", "--vertices", "20"});
     EXPECT_EQ(ran.code, 0) << mode << ": " << ran.err;
     EXPECT_THAT(ran.out, AllOf(HasSubstr("30, of which 0 failed"), HasSubstr("latency p99.9"),
@@ -522,11 +522,11 @@ TEST_F(HullctlQueries, LoadReportsEveryModeAndLeavesNoHullBehind) {
         << mode;
     EXPECT_EQ(ran.err, "") << mode;
   }
-  EXPECT_EQ(Ask({"list"}).out, Ask({"list", "cube"}).out);
+  EXPECT_EQ(Run({"list"}).out, Run({"list", "cube"}).out);
 }
 
 TEST_F(HullctlQueries, LoadCountsItemsInJson) {
-  const Ran ran = Ask({"bench", "load", "--mode", "batch", "--requests", "5", "--pairs", "70",
+  const Ran ran = Run({"bench", "load", "--mode", "batch", "--requests", "5", "--pairs", "70",
                        "--rate", "1000", "--json"});
   EXPECT_EQ(ran.code, 0) << ran.err;
   Struct json;
@@ -551,14 +551,14 @@ TEST_F(HullctlQueries, LoadCountsItemsInJson) {
 
 TEST_F(HullctlQueries, LoadRefusesAPrefixThatIsInUse) {
   Put("mine/cube", server::Cube());
-  const Ran ran = Ask({"bench", "load", "--requests", "1", "--prefix", "mine"});
+  const Ran ran = Run({"bench", "load", "--requests", "1", "--prefix", "mine"});
   EXPECT_EQ(ran.code, 1);
   EXPECT_THAT(ran.err, AllOf(HasSubstr("\"mine/cube\" already exists"), HasSubstr("--prefix")));
   EXPECT_EQ(Get("mine/cube").hull().vertex_count(), 8U);
 }
 
 TEST_F(HullctlQueries, LoadShowsErrorsByCode) {
-  const Ran ran = Ask({"bench", "load", "--mode", "append", "--requests", "2", "--timeout", "5s",
+  const Ran ran = Run({"bench", "load", "--mode", "append", "--requests", "2", "--timeout", "5s",
                        "--prefix", "a b"});
   EXPECT_EQ(ran.code, 1);
   EXPECT_THAT(ran.out, AllOf(HasSubstr("2, of which 2 failed"), HasSubstr("INVALID_ARGUMENT"),
@@ -577,7 +577,7 @@ TEST_F(HullctlQueries, AnInterruptedLoadReportsAndDeletesItsHulls) {
     }
     kill(getpid(), SIGINT);
   });
-  const Ran ran = Ask({"bench", "load", "--mode", "append", "--duration", "5m", "--points", "10",
+  const Ran ran = Run({"bench", "load", "--mode", "append", "--duration", "5m", "--points", "10",
                        "--prefix", "short/"});
   interrupter.join();
   EXPECT_EQ(ran.code, 0) << ran.err;
@@ -590,15 +590,15 @@ TEST_F(HullctlQueries, AnInterruptedLoadReportsAndDeletesItsHulls) {
 }
 
 TEST_F(HullctlQueries, NonsensicalLoadOptionsAreExplained) {
-  Ran ran = Ask({"bench", "load", "--rate", "0"});
+  Ran ran = Run({"bench", "load", "--rate", "0"});
   EXPECT_EQ(ran.code, 2);
   EXPECT_THAT(ran.err, HasSubstr("--rate: \"0\" is not a number of requests per second"));
-  ran = Ask({"bench", "load", "--clients", "0"});
+  ran = Run({"bench", "load", "--clients", "0"});
   EXPECT_EQ(ran.code, 2);
   EXPECT_THAT(ran.err, HasSubstr("whole number from 1 to 1000"));
-  EXPECT_EQ(Ask({"bench", "load", "--mode", "storm"}).code, 2);
-  EXPECT_EQ(Ask({"bench", "load", "--duration", "soon"}).code, 2);
-  EXPECT_EQ(Ask({"bench"}).code, 2);
+  EXPECT_EQ(Run({"bench", "load", "--mode", "storm"}).code, 2);
+  EXPECT_EQ(Run({"bench", "load", "--duration", "soon"}).code, 2);
+  EXPECT_EQ(Run({"bench"}).code, 2);
 }
 
 }  // namespace hullctl_server_test

@@ -30,32 +30,32 @@ Struct Json(const Ran& ran) {
 
 class HullctlTest : public testing::Test {
  protected:
-  Ran Ask(std::vector<std::string> arguments) {
+  Ran Run(std::vector<std::string> arguments) {
     arguments.insert(arguments.end(), {"--server", fake_.address()});
     return RunTool(arguments);
   }
-  Ran AskJson(std::vector<std::string> arguments) {
+  Ran RunJson(std::vector<std::string> arguments) {
     arguments.insert(arguments.end(), {"--output", "json"});
-    return Ask(arguments);
+    return Run(arguments);
   }
 
   FakeHulld fake_;
 };
 
 TEST_F(HullctlTest, CreateGetListAndDelete) {
-  EXPECT_EQ(Ask({"create", "a/1"}).out, "a/1 created at revision 1\n");
-  EXPECT_EQ(Ask({"create", "a/1", "--if-absent"}).out, "a/1 already exists at revision 1\n");
-  EXPECT_THAT(Ask({"get", "a/1"}).out, HasSubstr("vertices    0\n"));
-  EXPECT_THAT(Ask({"list", "a"}).out, AllOf(StartsWith("HULL"), HasSubstr("\na/1 ")));
-  const Ran wrong = Ask({"delete", "a/1", "--if-revision", "9"});
+  EXPECT_EQ(Run({"create", "a/1"}).out, "a/1 created at revision 1\n");
+  EXPECT_EQ(Run({"create", "a/1", "--if-absent"}).out, "a/1 already exists at revision 1\n");
+  EXPECT_THAT(Run({"get", "a/1"}).out, HasSubstr("vertices    0\n"));
+  EXPECT_THAT(Run({"list", "a"}).out, AllOf(StartsWith("HULL"), HasSubstr("\na/1 ")));
+  const Ran wrong = Run({"delete", "a/1", "--if-revision", "9"});
   EXPECT_EQ(wrong.code, 1);
   EXPECT_THAT(wrong.err, HasSubstr("'hullctl get' shows the current revision"));
-  EXPECT_EQ(Ask({"delete", "a/1", "--if-revision", "1"}).code, 0);
+  EXPECT_EQ(Run({"delete", "a/1", "--if-revision", "1"}).code, 0);
   EXPECT_EQ(fake_.hull("a/1").create_revision, 0u);
 }
 
 TEST_F(HullctlTest, ErrorsNameARemedy) {
-  const Ran missing = Ask({"get", "x"});
+  const Ran missing = Run({"get", "x"});
   EXPECT_EQ(missing.code, 1);
   EXPECT_EQ(missing.err, "hullctl: hull \"x\" not found (see 'hullctl list')\n");
   const Ran unreachable = RunTool({"list", "--server", "127.0.0.1:1"});
@@ -63,25 +63,25 @@ TEST_F(HullctlTest, ErrorsNameARemedy) {
   EXPECT_THAT(unreachable.err, StartsWith("hullctl: cannot reach hulld at 127.0.0.1:1; start it "
                                           "with 'hulld', or choose another with --server"));
   fake_.Hang("GetHull");
-  const Ran late = Ask({"get", "x", "--timeout", "50ms"});
+  const Ran late = Run({"get", "x", "--timeout", "50ms"});
   EXPECT_EQ(late.code, 3);
   EXPECT_THAT(late.err, HasSubstr("within 50 ms; raise --timeout"));
   fake_.FailNext("CreateHull", {HulldError(grpc::StatusCode::UNAVAILABLE, "draining",
                                            v1::ERROR_REASON_DRAINING)});
-  const Ran draining = Ask({"create", "x"});
+  const Ran draining = Run({"create", "x"});
   EXPECT_EQ(draining.code, 3);
   EXPECT_THAT(draining.err, HasSubstr("is unavailable: draining; try again later"));
   // The message text does not distinguish errors of gRPC from errors of hulld.
   fake_.FailNext("CreateHull", {HulldError(grpc::StatusCode::UNAVAILABLE, "cannot connect the disk",
                                            v1::ERROR_REASON_STORE_UNAVAILABLE)});
-  EXPECT_THAT(Ask({"create", "x"}).err, HasSubstr("is unavailable: cannot connect the disk"));
+  EXPECT_THAT(Run({"create", "x"}).err, HasSubstr("is unavailable: cannot connect the disk"));
   fake_.FailNext("CreateHull", {{grpc::StatusCode::UNAVAILABLE, "no route"}});
-  EXPECT_THAT(Ask({"create", "x"}).err, StartsWith("hullctl: cannot reach hulld at "));
+  EXPECT_THAT(Run({"create", "x"}).err, StartsWith("hullctl: cannot reach hulld at "));
   fake_.FailNext("CreateHull", {HulldError(grpc::StatusCode::RESOURCE_EXHAUSTED, "many hulls",
                                            v1::ERROR_REASON_LIMIT_EXCEEDED)});
-  EXPECT_EQ(Ask({"create", "x"}).err, "hullctl: many hulls\n");
+  EXPECT_EQ(Run({"create", "x"}).err, "hullctl: many hulls\n");
   fake_.FailNext("CreateHull", {{grpc::StatusCode::RESOURCE_EXHAUSTED, "too large"}});
-  EXPECT_THAT(Ask({"create", "x"}).err, HasSubstr("--max-message-bytes"));
+  EXPECT_THAT(Run({"create", "x"}).err, HasSubstr("--max-message-bytes"));
 }
 
 TEST_F(HullctlTest, MistakesOnTheCommandLineExitWithTwo) {
@@ -122,12 +122,12 @@ TEST_F(HullctlTest, IdsMustBeUtf8) {
                                              {"list", "caf\xE9"},
                                              {"check", "a", "caf\xE9"},
                                              {"body", "put", "b", "caf\xE9"}}) {
-    const Ran ran = Ask(arguments);
+    const Ran ran = Run(arguments);
     EXPECT_EQ(ran.code, 2) << testing::PrintToString(arguments);
     EXPECT_THAT(ran.err, HasSubstr("\"caf?\" is not UTF-8\n")) << testing::PrintToString(arguments);
   }
   const TempFile file("caf\xE9.xyz", "0 0 0\n");
-  EXPECT_EQ(Ask({"append", "a", file.path(), "--create"}).code, 0);
+  EXPECT_EQ(Run({"append", "a", file.path(), "--create"}).code, 0);
 }
 
 TEST_F(HullctlTest, AMistypedWordGetsASuggestion) {
@@ -225,11 +225,11 @@ TEST_F(HullctlTest, HelpAndVersionExitWithZero) {
 TEST_F(HullctlTest, AppendSendsFilesInChunks) {
   const TempFile first("one.xyz", "1 2 3\n4 5 6\n7 8 9\n");
   const TempFile second("two.obj", "v 0.1 1e-310 -0\n");
-  const Ran missing = Ask({"append", "a", first.path()});
+  const Ran missing = Run({"append", "a", first.path()});
   EXPECT_EQ(missing.code, 1);
   EXPECT_THAT(missing.err, HasSubstr("--create"));
   const Ran ran =
-      Ask({"append", "a", first.path(), second.path(), "--create", "--chunk-points", "2"});
+      Run({"append", "a", first.path(), second.path(), "--create", "--chunk-points", "2"});
   EXPECT_EQ(ran.code, 0) << ran.err;
   EXPECT_THAT(ran.out, HasSubstr("points     4 appended in 3 chunks\n"));
   EXPECT_THAT(fake_.hull("a").xyz, ElementsAre(1, 2, 3, 4, 5, 6, 7, 8, 9, 0.1, 1e-310, -0.0));
@@ -237,11 +237,11 @@ TEST_F(HullctlTest, AppendSendsFilesInChunks) {
 
 TEST_F(HullctlTest, AppendCountsSkippedPoints) {
   const TempFile file("a.csv", "x,y,z\n1,2,3\nnan,0,0\n0,inf,0\n4,5,6\n");
-  const Ran strict = Ask({"append", "a", "--create", file.path()});
+  const Ran strict = Run({"append", "a", "--create", file.path()});
   EXPECT_EQ(strict.code, 2);
   EXPECT_THAT(strict.err,
               HasSubstr(".csv:3: point 2 has x = NaN; skip such points with --skip-nonfinite"));
-  const Ran ran = Ask({"append", "b", "--create", "--skip-nonfinite", file.path()});
+  const Ran ran = Run({"append", "b", "--create", "--skip-nonfinite", file.path()});
   EXPECT_EQ(ran.code, 0) << ran.err;
   EXPECT_THAT(ran.out, HasSubstr("skipped    2 points with NaN or infinity\n"));
   EXPECT_THAT(fake_.hull("b").xyz, ElementsAre(1, 2, 3, 4, 5, 6));
@@ -249,12 +249,12 @@ TEST_F(HullctlTest, AppendCountsSkippedPoints) {
 
 TEST_F(HullctlTest, AppendAndReplaceCountPointsAtZero) {
   const TempFile file("a.xyz", "0 0 0\n1 2 3\n0 0 0\nnan 0 0\n4 5 6\n");
-  Ran ran = Ask({"append", "a", "--create", "--skip-zero", "--skip-nonfinite", file.path()});
+  Ran ran = Run({"append", "a", "--create", "--skip-zero", "--skip-nonfinite", file.path()});
   EXPECT_EQ(ran.code, 0) << ran.err;
   EXPECT_THAT(ran.out, HasSubstr("skipped    1 point with NaN or infinity\n"
                                  "skipped    2 points at (0, 0, 0)\n"));
   EXPECT_THAT(fake_.hull("a").xyz, ElementsAre(1, 2, 3, 4, 5, 6));
-  ran = Ask({"append", "b", "--create", "--skip-zero", "--skip-nonfinite", file.path(), "--output",
+  ran = Run({"append", "b", "--create", "--skip-zero", "--skip-nonfinite", file.path(), "--output",
              "name"});
   EXPECT_EQ(ran.out, "b\n");
   EXPECT_THAT(ran.err, HasSubstr("hullctl: 2 points at (0, 0, 0) were skipped\n"));
@@ -262,7 +262,7 @@ TEST_F(HullctlTest, AppendAndReplaceCountPointsAtZero) {
 
 TEST_F(HullctlTest, AnErrorInAFileLeavesTheChunksBeforeIt) {
   const TempFile file("a.csv", "1,2,3\n4,5,6\n7,abc,9\n");
-  const Ran ran = Ask({"append", "a", "--create", "--chunk-points", "1", file.path()});
+  const Ran ran = Run({"append", "a", "--create", "--chunk-points", "1", file.path()});
   EXPECT_EQ(ran.code, 2);
   EXPECT_THAT(ran.err, HasSubstr("a.csv:3: \"abc\" is not a number"));
   EXPECT_THAT(ran.out, HasSubstr("2 appended in 2 chunks"));
@@ -276,10 +276,10 @@ TEST_F(HullctlTest, AppendResumesWhereTheWriterStopped) {
   fake_.ScriptStreams({script});
   const std::vector<std::string> command = {"append",         "a", "--create", "--writer", "w",
                                             "--chunk-points", "1", file.path()};
-  EXPECT_EQ(Ask(command).code, 1);
+  EXPECT_EQ(Run(command).code, 1);
   std::vector<std::string> again = command;
   again.push_back("--resume");
-  const Ran resumed = Ask(again);
+  const Ran resumed = Run(again);
   EXPECT_EQ(resumed.code, 0) << resumed.err;
   EXPECT_THAT(resumed.out, HasSubstr("2 points already committed"));
   EXPECT_THAT(fake_.hull("a").xyz, ElementsAre(1, 1, 1, 2, 2, 2, 3, 3, 3));
@@ -296,7 +296,7 @@ TEST_F(HullctlTest, CheckForwardsPosesAndOptions) {
   fake_.collision_answer.mutable_analysis()->set_stage(v1::AXIS_KIND_EDGE_EDGE);
   fake_.collision_answer.mutable_analysis()->mutable_time()->set_nanos(1500000);
   fake_.collision_answer.mutable_analysis()->mutable_size_b()->set_edges(12);
-  const Ran ran = Ask({"check", "a", "b", "--pose-a", "-1,0,0", "--pose-b", "2,1,0,0,5,6,7",
+  const Ran ran = Run({"check", "a", "b", "--pose-a", "-1,0,0", "--pose-b", "2,1,0,0,5,6,7",
                        "--textbook", "--axis", "--report"});
   EXPECT_EQ(ran.code, 0) << ran.err;
   const v1::CheckCollisionRequest request = fake_.last_collision_request();
@@ -327,7 +327,7 @@ TEST_F(HullctlTest, CheckShowsMeasuredValues) {
   answer.mutable_certificate()->mutable_integer_direction()->set_y("-7");
   answer.mutable_certificate()->mutable_integer_direction()->set_z("0");
   answer.mutable_certificate()->add_pairs()->set_index_a(3);
-  const Ran ran = Ask({"check", "a", "b", "--max-error", "1e-3", "--witness", "--normal",
+  const Ran ran = Run({"check", "a", "b", "--max-error", "1e-3", "--witness", "--normal",
                        "--clearance", "0.75", "--certificate"});
   EXPECT_EQ(ran.code, 0) << ran.err;
   const v1::Wanted wanted = fake_.last_collision_request().wanted();
@@ -341,14 +341,14 @@ TEST_F(HullctlTest, CheckShowsMeasuredValues) {
                     HasSubstr("normal         0 1 0 within 1e-15 rad\n"),
                     HasSubstr("clearance      within 0.75\n"),
                     HasSubstr("n = 12345678...(30 digits) -7 0; A 3 with B 0\n")));
-  EXPECT_EQ(Ask({"check", "a", "b", "--tolerance", "0.25"}).code, 0);
+  EXPECT_EQ(Run({"check", "a", "b", "--tolerance", "0.25"}).code, 0);
   EXPECT_EQ(fake_.last_collision_request().tolerance(), 0.25);
   EXPECT_FALSE(fake_.last_collision_request().wanted().has_clearance());
 }
 
 TEST_F(HullctlTest, ACollisionIsNotAnError) {
   fake_.collision_answer.set_relation(v1::RELATION_OVERLAPPING);
-  EXPECT_EQ(Ask({"check", "a", "b"}).code, 0);
+  EXPECT_EQ(Run({"check", "a", "b"}).code, 0);
 }
 
 TEST_F(HullctlTest, BatchPrintsEachPairAndExitsWithFourWhenSomeFail) {
@@ -356,16 +356,16 @@ TEST_F(HullctlTest, BatchPrintsEachPairAndExitsWithFourWhenSomeFail) {
   const TempFile good(
       "good",
       "place: {a: {id: box}, b: {id: box, at: [1, 2, 3]}}\nask: {pairs: [[a, b], [b, a]]}\n");
-  const Ran fine = Ask({"batch", good.path()});
+  const Ran fine = Run({"batch", good.path()});
   EXPECT_EQ(fine.code, 0) << fine.err;
   EXPECT_EQ(fine.out,
             "a\tb\tTOUCHING\nb\ta\tTOUCHING\n# separated 0 touching 2 overlapping 0 failed 0\n");
   const TempFile mixed("mixed", "place: {a: {id: box}, b: {id: box}, c: {id: nope}}\n");
-  const Ran some = Ask({"batch", mixed.path()});
+  const Ran some = Run({"batch", mixed.path()});
   EXPECT_EQ(some.code, 4);
   EXPECT_THAT(some.out, HasSubstr("a\tc\tFAILED\thull \"nope\" not found\n"));
   EXPECT_THAT(some.err, HasSubstr("2 of 3 pairs failed"));
-  const Ran json = AskJson({"batch", mixed.path(), "--axis", "--report"});
+  const Ran json = RunJson({"batch", mixed.path(), "--axis", "--report"});
   EXPECT_EQ(json.code, 4);
   v1::BatchCheckCollisionsResponse all;
   for (const auto& part : MessagesIn<v1::BatchCheckCollisionsResponse>(json.out)) {
@@ -377,7 +377,7 @@ TEST_F(HullctlTest, BatchPrintsEachPairAndExitsWithFourWhenSomeFail) {
   EXPECT_EQ(all.placement_problems(0).placement(), 2u);
   EXPECT_EQ(all.placement_problems(0).code(), grpc::StatusCode::NOT_FOUND);
   EXPECT_EQ(all.columns().axes(0).kind(), v1::AXIS_KIND_EDGE_EDGE);
-  const Ran unclear = AskJson({"batch", mixed.path(), "--colliding"});
+  const Ran unclear = RunJson({"batch", mixed.path(), "--colliding"});
   EXPECT_EQ(unclear.code, 2);
   EXPECT_THAT(unclear.err, HasSubstr("use 'hullctl scene' to find colliding pairs"));
 }
@@ -387,7 +387,7 @@ TEST_F(HullctlTest, LargeBatchesAreSplitIntoCompleteCalls) {
   std::string text = "place:\n  extra: {id: box}\n";
   for (int i = 0; i < 500; ++i) text += "  p" + std::to_string(i) + ": {id: box}\n";
   const TempFile file("big", text);
-  const Ran ran = Ask({"batch", file.path()});
+  const Ran ran = Run({"batch", file.path()});
   EXPECT_EQ(ran.code, 0) << ran.err;
   EXPECT_THAT(ran.out, HasSubstr("# separated 0 touching 125250 overlapping 0 failed 0\n"));
   const auto requests = fake_.batch_requests();
@@ -397,7 +397,7 @@ TEST_F(HullctlTest, LargeBatchesAreSplitIntoCompleteCalls) {
   // API messages identify placements by index in the file, with consecutive pair numbers.
   uint64_t next = 0;
   for (const auto& part :
-       MessagesIn<v1::BatchCheckCollisionsResponse>(AskJson({"batch", file.path()}).out)) {
+       MessagesIn<v1::BatchCheckCollisionsResponse>(RunJson({"batch", file.path()}).out)) {
     if (part.columns().relations_size() == 0) continue;
     EXPECT_EQ(part.first_pair(), next);
     next += static_cast<uint64_t>(part.columns().relations_size());
@@ -424,24 +424,24 @@ TEST_F(HullctlTest, AnInconsistentBatchIsRefused) {
   for (int i = 0; i < 2; ++i) half.mutable_columns()->add_separations(1);
   for (const auto& answer : {late, few, many, ragged, half}) {
     fake_.batch_answers = {answer};
-    EXPECT_EQ(Ask({"batch", file.path()}).code, 1);
+    EXPECT_EQ(Run({"batch", file.path()}).code, 1);
   }
 }
 
 TEST_F(HullctlTest, EveryJsonOutputIsValid) {
   const TempFile points("a.xyz", "1 2 3\n");
   const auto appended =
-      MessagesIn<v1::AppendPointsResponse>(AskJson({"append", "a", "--create", points.path()}).out);
+      MessagesIn<v1::AppendPointsResponse>(RunJson({"append", "a", "--create", points.path()}).out);
   ASSERT_EQ(appended.size(), 2u);
   EXPECT_EQ(appended[0].opened().hull().hull_id(), "a");
   EXPECT_EQ(appended[1].ack().sequence(), 1u);
   EXPECT_EQ(appended[1].ack().counts().received(), 1u);
-  Json(AskJson({"create", "b"}));
-  Json(AskJson({"get", "a", "--audit"}));
-  EXPECT_EQ(Json(AskJson({"list"})).fields().at("hulls").list_value().values_size(), 2);
-  Json(AskJson({"check", "a", "b", "--axis", "--report"}));
-  EXPECT_EQ(MessagesIn<v1::GetStatusResponse>(AskJson({"status"}).out).size(), 1u);
-  Json(AskJson({"delete", "b"}));
+  Json(RunJson({"create", "b"}));
+  Json(RunJson({"get", "a", "--audit"}));
+  EXPECT_EQ(Json(RunJson({"list"})).fields().at("hulls").list_value().values_size(), 2);
+  Json(RunJson({"check", "a", "b", "--axis", "--report"}));
+  EXPECT_EQ(MessagesIn<v1::GetStatusResponse>(RunJson({"status"}).out).size(), 1u);
+  Json(RunJson({"delete", "b"}));
   EXPECT_EQ(QuoteJson("a\"b\\c\n\x01"), "\"a\\\"b\\\\c\\u000a\\u0001\"");
   // A name in Latin-1 made the output invalid.
   EXPECT_EQ(QuoteJson("caf\xE9 \xE2\x82\xAC"), "\"caf\xEF\xBF\xBD \xE2\x82\xAC\"");
@@ -449,8 +449,8 @@ TEST_F(HullctlTest, EveryJsonOutputIsValid) {
 
 TEST_F(HullctlTest, GetShowsProperties) {
   fake_.PutHull("a", {});
-  EXPECT_THAT(Ask({"get", "a"}).out, testing::Not(HasSubstr("volume")));
-  const Ran ran = Ask({"get", "a", "--properties"});
+  EXPECT_THAT(Run({"get", "a"}).out, testing::Not(HasSubstr("volume")));
+  const Ran ran = Run({"get", "a", "--properties"});
   EXPECT_EQ(ran.code, 0) << ran.err;
   EXPECT_THAT(ran.out, AllOf(HasSubstr("volume            8 within 0\n"),
                              HasSubstr("area              24 within 4e-15\n"),
@@ -461,17 +461,17 @@ TEST_F(HullctlTest, GetShowsProperties) {
 
 TEST_F(HullctlTest, AnAuditWithAFindingFails) {
   fake_.PutHull("a", {});
-  EXPECT_EQ(Ask({"get", "a", "--audit"}).code, 0);
+  EXPECT_EQ(Run({"get", "a", "--audit"}).code, 0);
   fake_.audit_finding = "edge 3 is not convex";
-  const Ran ran = Ask({"get", "a", "--audit"});
+  const Ran ran = Run({"get", "a", "--audit"});
   EXPECT_EQ(ran.code, 1);
   EXPECT_THAT(ran.err, HasSubstr("edge 3 is not convex"));
 }
 
 TEST_F(HullctlTest, StatusFailsIfTheServerIsNotServing) {
-  EXPECT_THAT(Ask({"status"}).out, HasSubstr("SERVING"));
+  EXPECT_THAT(Run({"status"}).out, HasSubstr("SERVING"));
   fake_.SetServing(false);
-  const Ran ran = Ask({"status"});
+  const Ran ran = Run({"status"});
   EXPECT_EQ(ran.code, 1);
   EXPECT_THAT(ran.out, HasSubstr("NOT_SERVING"));
   EXPECT_EQ(RunTool({"status", "--server", "127.0.0.1:1"}).code, 3);
@@ -499,12 +499,12 @@ std::vector<v1::GetHullMeshResponse> Tetrahedron() {
 TEST_F(HullctlTest, MeshWritesObjThatReadsBackExactly) {
   fake_.mesh_parts = Tetrahedron();
   const TempFile file("a.obj", "");
-  ASSERT_EQ(Ask({"mesh", "a", "-o", file.path()}).code, 0);
+  ASSERT_EQ(Run({"mesh", "a", "-o", file.path()}).code, 0);
   EXPECT_THAT(ReadFile(file.path(), PointFormat::kObj).xyz(),
               ElementsAre(0.1, 1e-310, 0.0, 1.0 / 3, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1e308));
-  const Ran printed = Ask({"mesh", "a"});
+  const Ran printed = Run({"mesh", "a"});
   EXPECT_THAT(printed.out, HasSubstr("f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"));
-  EXPECT_EQ(Ask({"mesh", "a", "-o", "/no/such/folder/a.obj"}).code, 2);
+  EXPECT_EQ(Run({"mesh", "a", "-o", "/no/such/folder/a.obj"}).code, 2);
 }
 
 TEST_F(HullctlTest, CheckQueriesAgainIfAHullChangesBeforeVerification) {
@@ -517,13 +517,13 @@ TEST_F(HullctlTest, CheckQueriesAgainIfAHullChangesBeforeVerification) {
   answer.mutable_certificate()->add_pairs();
   answer.mutable_certificate()->mutable_direction()->set_x(1);
   answer.mutable_hull_a()->set_revision(6);
-  const Ran moved = Ask({"check", "a", "a", "--verify"});
+  const Ran moved = Run({"check", "a", "a", "--verify"});
   EXPECT_EQ(moved.code, 6);
   EXPECT_THAT(moved.err, HasSubstr("hull a is at revision 7; the answer is from revision 6"));
   EXPECT_EQ(fake_.calls("CheckCollision"), 5);
   answer.mutable_hull_a()->set_revision(7);
   answer.mutable_hull_b()->set_revision(7);
-  const Ran wrong = Ask({"check", "a", "a", "--verify"});
+  const Ran wrong = Run({"check", "a", "a", "--verify"});
   EXPECT_EQ(wrong.code, 5);
   EXPECT_EQ(fake_.calls("CheckCollision"), 6);
   EXPECT_THAT(wrong.err, HasSubstr("does not prove the answer"));
@@ -534,14 +534,14 @@ TEST_F(HullctlTest, SimplifiedMeshStatesItsError) {
   v1::MeshHeader& header = *fake_.mesh_parts[0].mutable_header();
   header.mutable_hull()->set_vertex_count(72);
   header.set_error(0.25);
-  EXPECT_THAT(Ask({"mesh", "a", "--max-vertices", "8", "--outside"}).out,
+  EXPECT_THAT(Run({"mesh", "a", "--max-vertices", "8", "--outside"}).out,
               HasSubstr("4 vertices, 4 facets, simplified from 72 vertices within 0.25\n"));
   EXPECT_EQ(fake_.last_mesh_request.simplification().side(), v1::SIMPLIFICATION_SIDE_OUTSIDE);
   EXPECT_EQ(fake_.last_mesh_request.simplification().max_vertices(), 8u);
-  const Ran unclear = Ask({"mesh", "a", "--outside"});
+  const Ran unclear = Run({"mesh", "a", "--outside"});
   EXPECT_EQ(unclear.code, 2);
   EXPECT_THAT(unclear.err, HasSubstr("--max-vertices"));
-  EXPECT_EQ(Ask({"mesh", "a", "--max-error", "-1"}).code, 2);
+  EXPECT_EQ(Run({"mesh", "a", "--max-error", "-1"}).code, 2);
 }
 
 TEST_F(HullctlTest, AFalseSimplificationIsNotWritten) {
@@ -550,15 +550,15 @@ TEST_F(HullctlTest, AFalseSimplificationIsNotWritten) {
   const TempFile file("a.obj", "");
   const std::vector<std::string> verify = {"mesh",     "a",  "--max-vertices", "4",
                                            "--verify", "-o", file.path()};
-  const Ran valid = Ask(verify);
+  const Ran valid = Run(verify);
   EXPECT_EQ(valid.code, 0);
   EXPECT_THAT(valid.err, HasSubstr("simplified from 4 vertices within 0, verified\n"));
-  const Ran many = Ask({"mesh", "a", "--max-vertices", "3", "--verify"});
+  const Ran many = Run({"mesh", "a", "--max-vertices", "3", "--verify"});
   EXPECT_EQ(many.code, 5);
   EXPECT_EQ(many.out, "");
   EXPECT_THAT(many.err, HasSubstr("is invalid; nothing was written: the simplification "
                                   "has 4 vertices; at most 3 were requested"));
-  const Ran whole = Ask({"mesh", "a", "--verify"});
+  const Ran whole = Run({"mesh", "a", "--verify"});
   EXPECT_EQ(whole.code, 2);
   EXPECT_THAT(whole.err, HasSubstr("--max-vertices"));
 }
@@ -570,7 +570,7 @@ TEST_F(HullctlTest, MeshWritesSegmentsAndPoints) {
   v1::GetHullMeshResponse vertices;
   for (int i = 0; i < 6; ++i) vertices.mutable_vertices()->add_xyz(i);
   fake_.mesh_parts = {header, vertices};
-  EXPECT_THAT(Ask({"mesh", "a"}).out, HasSubstr("v 0 1 2\nv 3 4 5\nl 1 2\n"));
+  EXPECT_THAT(Run({"mesh", "a"}).out, HasSubstr("v 0 1 2\nv 3 4 5\nl 1 2\n"));
 }
 
 TEST_F(HullctlTest, GenerateWritesTheSamePointsEachTime) {
@@ -586,7 +586,7 @@ TEST_F(HullctlTest, NamesArePrintedOnePerLine) {
   const TempFile points("a.xyz", "1 2 3\n");
   const auto names = [this](std::vector<std::string> arguments) {
     arguments.insert(arguments.end(), {"--output", "name", "--color", "always"});
-    return Ask(arguments).out;
+    return Run(arguments).out;
   };
   EXPECT_EQ(names({"create", "b"}), "b\n");
   EXPECT_EQ(names({"append", "a", "--create", points.path()}), "a\n");
@@ -604,14 +604,14 @@ TEST_F(HullctlTest, NamesArePrintedOnePerLine) {
 TEST_F(HullctlTest, ColorsAreForTerminalsUnlessRequested) {
   fake_.collision_answer.set_relation(v1::RELATION_OVERLAPPING);
   constexpr char kPainted[] = "\x1b[31mOVERLAPPING\x1b[0m";
-  EXPECT_THAT(Ask({"check", "a", "b"}).out, testing::Not(HasSubstr("\x1b")));
-  EXPECT_THAT(Ask({"check", "a", "b", "--color", "never"}).out, testing::Not(HasSubstr("\x1b")));
-  EXPECT_THAT(Ask({"check", "a", "b", "--color", "always"}).out, HasSubstr(kPainted));
-  EXPECT_THAT(AskJson({"check", "a", "b", "--color", "always"}).out,
+  EXPECT_THAT(Run({"check", "a", "b"}).out, testing::Not(HasSubstr("\x1b")));
+  EXPECT_THAT(Run({"check", "a", "b", "--color", "never"}).out, testing::Not(HasSubstr("\x1b")));
+  EXPECT_THAT(Run({"check", "a", "b", "--color", "always"}).out, HasSubstr(kPainted));
+  EXPECT_THAT(RunJson({"check", "a", "b", "--color", "always"}).out,
               testing::Not(HasSubstr("\x1b")));
   // Column widths count visible characters only.
   fake_.PutHull("long-name", {});
-  const Ran list = Ask({"list", "--color", "always"});
+  const Ran list = Run({"list", "--color", "always"});
   EXPECT_THAT(list.out, HasSubstr("\x1b[1mHULL\x1b[0m       \x1b[1mDIMENSION"));
 }
 

@@ -81,7 +81,7 @@ def test_masked_poses_pairs_and_indices_are_refused(silent: Any) -> None:
         np.longdouble(1) / 3,
     ],
 )
-def test_a_number_that_no_double_holds_is_refused(silent: Any, number: Any) -> None:
+def test_numbers_that_no_double_represents_are_refused(silent: Any, number: Any) -> None:
     cube = ("a", "b")
     for call in (
         lambda: hulld.Pose((1, 0, 0, 0), (number, 0, 0)),
@@ -102,7 +102,7 @@ def test_a_number_that_no_double_holds_is_refused(silent: Any, number: Any) -> N
             call()
 
 
-def test_numbers_of_other_types_pass_if_a_double_holds_them() -> None:
+def test_numbers_of_other_types_are_accepted_if_a_double_represents_them() -> None:
     for number in (2**53, np.int8(3), np.float32(0.1), np.longdouble(0.5), np.array(2.0)):
         assert hulld.Pose((1, 0, 0, 0), (number, 0, 0)).translation[0] == float(number)
     assert hulld.as_points([[2**60, 0.5, 0]]).tolist() == [[2.0**60, 0.5, 0]]
@@ -123,14 +123,14 @@ def test_numbers_of_other_types_pass_if_a_double_holds_them() -> None:
         np.zeros((2, 3), "i4,i4"),
     ],
 )
-def test_arrays_of_anything_but_numbers_are_refused(array: Any) -> None:
+def test_arrays_without_numbers_are_refused(array: Any) -> None:
     for call in (hulld.as_points, hulld.pack_poses, lambda a: hulld.Placements("a", a)):
         with pytest.raises(TypeError):
             call(array)
 
 
 @pytest.mark.parametrize("value", [True, np.True_, "1", 1j, None, decimal.Decimal(1)])
-def test_scalars_of_anything_but_numbers_are_refused(silent: Any, value: Any) -> None:
+def test_scalars_that_are_not_numbers_are_refused(silent: Any, value: Any) -> None:
     for call in (
         lambda: hulld.Pose((1, 0, 0, 0), (value, 0, 0)),
         lambda: silent.check_collision("a", "b", tolerance=value),
@@ -159,7 +159,7 @@ def test_lengths_are_at_least_zero(silent: Any, value: float) -> None:
         (np.full((4, 4), np.nan), "not finite"),
     ],
 )
-def test_a_pose_that_is_no_motion_is_named(silent: Any, pose: Any, message: str) -> None:
+def test_invalid_poses_are_named(silent: Any, pose: Any, message: str) -> None:
     for call in (
         lambda: silent.check_collision("a", ("b", pose)),
         lambda: silent.check_collisions(["a", ("b", pose)]),
@@ -177,7 +177,7 @@ def test_a_pose_that_is_no_motion_is_named(silent: Any, pose: Any, message: str)
             hulld.Pose(*bad)
 
 
-def test_a_wrong_update_ends_no_stream(either: Any, name: str) -> None:
+def test_a_wrong_update_does_not_end_the_stream(either: Any, name: str) -> None:
     either.append_points(name, CUBE, create=True)
     with either.stream_collisions([name, name]) as stream:
         for placements, poses in (
@@ -376,7 +376,7 @@ def test_times_are_finite_and_not_negative(silent: Any, bad: Any) -> None:
         ("dns:///hulls.example:7", "dns:///hulls.example:7"),
     ],
 )
-def test_an_address_without_a_port_gets_hullds(given: str, meant: str) -> None:
+def test_an_address_without_a_port_gets_the_default_port(given: str, meant: str) -> None:
     with hulld.Client(given) as client:
         assert client.server == meant
 
@@ -384,13 +384,13 @@ def test_an_address_without_a_port_gets_hullds(given: str, meant: str) -> None:
 @pytest.mark.parametrize(
     "bad", [50551, None, b"localhost", "", ":7", "a:", "a:0", "a:65536", "a:b", "http://a:7", "a b"]
 )
-def test_what_is_no_address_is_refused(bad: Any) -> None:
+def test_malformed_addresses_are_refused(bad: Any) -> None:
     for kind in (hulld.Client, hulld.AsyncClient):
         with pytest.raises((ValueError, TypeError), match="server is .* it must be"):
             kind(bad)
 
 
-def test_nothing_of_all_this_reaches_a_server(connect: Callable[..., Any]) -> None:
+def test_no_wrong_argument_reaches_a_server(connect: Callable[..., Any]) -> None:
     with FakeHulld() as fake:
         client = connect(fake.address)
         for call in (

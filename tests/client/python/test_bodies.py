@@ -44,7 +44,7 @@ def test_poses_arrive_bit_for_bit(either: Any, name: str, cube: str) -> None:
     assert either.get_body(f"{name}/body").pieces.poses.tobytes() == poses.tobytes()
 
 
-def test_what_differs_goes_on_another_page(either: Any, name: str, cube: str) -> None:
+def test_bodies_are_listed_over_several_pages(either: Any, name: str, cube: str) -> None:
     names = [f"{name}/body-{i}" for i in range(5)]
     for body in names:
         either.put_body(body, [cube])
@@ -119,7 +119,7 @@ def test_wrong_pieces_are_refused_before_they_are_sent(either: Any, name: str, c
     assert list(either.list_bodies(f"{name}/")) == []
 
 
-def test_watches_tell_of_bodies_that_change(either: Any, name: str, cube: str) -> None:
+def test_watches_report_bodies_that_change(either: Any, name: str, cube: str) -> None:
     body = f"{name}/body"
     either.put_body(body, [cube])
     with either.watch_hulls(f"{name}/", bodies=True) as watch:

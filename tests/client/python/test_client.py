@@ -52,7 +52,7 @@ def test_both_clients_have_one_surface() -> None:
             assert inspect.getdoc(getattr(sync, name)) and inspect.getdoc(getattr(other, name))
 
 
-def test_status_tells_version_and_limits(either: Any) -> None:
+def test_status_contains_version_and_limits(either: Any) -> None:
     status = either.get_status()
     assert status.version and status.store_kind == "memory"
     assert status.limits.max_points_per_chunk == 200000
@@ -143,7 +143,7 @@ def test_points_come_from_an_iterator(either: Any, name: str) -> None:
     assert replaced.hull.vertex_count == 8 and replaced.hull.counts.received == 16
 
 
-def test_what_is_wrong_is_refused_before_anything_is_sent(either: Any, name: str) -> None:
+def test_wrong_arguments_are_refused_before_anything_is_sent(either: Any, name: str) -> None:
     with pytest.raises(ValueError, match=r"points\[8\]\.x is nan"):
         either.append_points(name, np.concatenate([CUBE, [[np.nan, 0, 0]]]), chunk_bytes=24)
     put(either, name)
@@ -162,7 +162,7 @@ def test_a_revision_that_does_not_match_stops_an_append(either: Any, name: str) 
     assert caught.value.metadata["if_revision"] == str(revision)
 
 
-def test_an_appender_numbers_on_where_its_writer_was(either: Any, name: str) -> None:
+def test_an_appender_continues_the_sequence_of_its_writer(either: Any, name: str) -> None:
     with either.open_append(name, create=True, writer_id="lab") as appender:
         assert appender.opened.last_sequence == 0 and appender.writer_id == "lab"
         appender.append(CUBE[:4])
@@ -174,7 +174,7 @@ def test_an_appender_numbers_on_where_its_writer_was(either: Any, name: str) -> 
         assert again.opened.last_sequence == 2
 
 
-def test_leaving_an_appender_waits_for_what_was_sent(either: Any, name: str) -> None:
+def test_leaving_an_appender_waits_for_acknowledgements(either: Any, name: str) -> None:
     with either.open_append(name, create=True, max_in_flight_chunks=2) as appender:
         for point in CUBE:
             appender.append(point)
@@ -182,7 +182,7 @@ def test_leaving_an_appender_waits_for_what_was_sent(either: Any, name: str) -> 
     assert either.get_hull(name).info.vertex_count == 8
 
 
-def test_an_error_in_a_with_block_is_the_one_that_is_seen(either: Any, name: str) -> None:
+def test_an_error_in_a_with_block_is_raised(either: Any, name: str) -> None:
     with pytest.raises(KeyError, match="mine"):
         with either.open_append(name, create=True) as appender:
             appender.append(CUBE)
@@ -233,7 +233,7 @@ def test_a_mesh_has_vertices_facets_and_triangles(either: Any, name: str) -> Non
     assert np.linalg.det(triangles - 0.5).sum() / 6 == pytest.approx(1)
 
 
-def test_a_mesh_of_many_messages_is_put_together(
+def test_a_mesh_of_many_messages_is_assembled(
     either: Any, name: str, rng: np.random.Generator
 ) -> None:
     points = ball(rng, 60000)
@@ -252,7 +252,7 @@ def test_flat_and_empty_hulls_have_meshes(either: Any, name: str) -> None:
     assert either.get_hull(f"{name}-empty").box is None
 
 
-def test_a_simpler_hull_says_how_far_off_it_is(
+def test_a_simplified_hull_states_its_error(
     either: Any, name: str, rng: np.random.Generator
 ) -> None:
     put(either, name, ball(rng, 500))
@@ -269,7 +269,7 @@ def test_a_simpler_hull_says_how_far_off_it_is(
 # --- Pairs ---
 
 
-def test_one_pair_is_answered_with_all_that_is_wanted(either: Any, name: str) -> None:
+def test_one_pair_is_answered_with_every_wanted_result(either: Any, name: str) -> None:
     put(either, name)
     plain = either.check_collision(name, (name, (1, 0, 0)))
     assert plain.relation == hulld.Relation.TOUCHING and plain.colliding
@@ -379,7 +379,7 @@ def test_a_batch_of_many_messages_comes_in_order(
     np.testing.assert_array_equal(batch.answers.relations, expected)
 
 
-def test_a_pair_without_an_answer_says_why(either: Any, name: str) -> None:
+def test_a_pair_without_an_answer_has_a_problem(either: Any, name: str) -> None:
     put(either, name)
     batch = either.check_collisions([name, "no/such", name])
     assert batch.answers.relations.tolist() == [0, 3, 0]
@@ -460,7 +460,7 @@ def test_a_stream_answers_what_moved(either: Any, name: str) -> None:
         stream.update([1], [(0, 0, 0)])
 
 
-def test_a_stream_that_the_server_ends_tells_why(either: Any, name: str) -> None:
+def test_a_stream_that_the_server_ends_raises_the_reason(either: Any, name: str) -> None:
     put(either, name)
     with either.stream_collisions([name, name], only_changes=True) as stream:
         assert stream.update([1], [(0.1, 0, 0)]).answers.relations.tolist() == []
@@ -475,20 +475,20 @@ def test_a_stream_that_the_server_ends_tells_why(either: Any, name: str) -> None
 # --- Watches ---
 
 
-def test_a_watch_tells_what_is_there_and_what_comes(either: Any, name: str) -> None:
+def test_a_watch_reports_existing_hulls_and_changes(either: Any, name: str) -> None:
     put(either, f"{name}/a")
-    told: dict[str, str] = {}
+    reported: dict[str, str] = {}
     with either.watch_hulls(f"{name}/") as watch:
         changes = next(watch)
         while not changes.synced:
-            told |= {event.hull.hull_id: event.kind.name for event in changes.events}
+            reported |= {event.hull.hull_id: event.kind.name for event in changes.events}
             changes = next(watch)
-        assert told == {f"{name}/a": "PRESENT"}
+        assert reported == {f"{name}/a": "PRESENT"}
         either.create_hull(f"{name}/b")
         put(either, f"{name}/a", 2 * CUBE)
         either.delete_hull(f"{name}/b")
-        while told.get(f"{name}/a") != "CHANGED" or told.get(f"{name}/b") == "CREATED":
-            told |= {event.hull.hull_id: event.kind.name for event in next(watch).events}
+        while reported.get(f"{name}/a") != "CHANGED" or reported.get(f"{name}/b") == "CREATED":
+            reported |= {event.hull.hull_id: event.kind.name for event in next(watch).events}
         position = watch.position
     assert list(watch) == []
     either.replace_hull(f"{name}/a", CUBE)
@@ -501,7 +501,7 @@ def test_a_watch_tells_what_is_there_and_what_comes(either: Any, name: str) -> N
         assert not changes.restarted
 
 
-def test_a_watch_tells_of_contacts_that_begin_and_end(either: Any, name: str) -> None:
+def test_a_watch_reports_contacts_that_begin_and_end(either: Any, name: str) -> None:
     put(either, name)
     with either.watch_collisions([name, (name, (3, 0, 0))], clearance=1.5) as watch:
 
@@ -531,7 +531,7 @@ def test_a_watch_tells_of_contacts_that_begin_and_end(either: Any, name: str) ->
     assert list(watch) == []
 
 
-def test_a_watch_of_collisions_outlives_its_server(
+def test_a_collision_watch_survives_a_restart_of_its_server(
     connect: Any, tmp_path: pathlib.Path, name: str
 ) -> None:
     def run() -> hulld.LocalServer:
@@ -627,7 +627,7 @@ def test_answers_are_read_row_by_row(either: Any, name: str) -> None:
         bool(batch)
 
 
-def test_texts_are_short(either: Any, name: str) -> None:
+def test_reprs_are_short(either: Any, name: str) -> None:
     put(either, name)
     wanted = {"separation": True, "witness": True, "axis": True, "certificate": True}
     answer = either.check_collision(name, (name, (2, 0, 0)), **wanted)

@@ -57,7 +57,7 @@ def test_a_ur5_hits_itself(tmp_path: pathlib.Path, data: pathlib.Path) -> None:
     assert "base_link - shoulder_link" not in said and "wrist_1_link - wrist_2_link" not in said
 
 
-def test_the_trade_leaves_open_what_is_near(tmp_path: pathlib.Path) -> None:
+def test_a_larger_tolerance_leaves_more_pairs_undecided(tmp_path: pathlib.Path) -> None:
     said = run("trade_plot.py", "trade.png", cwd=tmp_path)
     rows = re.findall(r"^ *([0-9.e-]+) +[0-9.]+ +[0-9.]+x +([0-9.]+)%$", said, re.M)
     assert [row[0] for row in rows] == ["0", "1e-15", "1e-12", "1e-09", "1e-06", "0.001"]

@@ -64,7 +64,7 @@ def full(context: Any) -> None:
 # --- Single calls ---
 
 
-def test_a_call_that_is_safe_to_repeat_is_repeated(caller: Any, fake: FakeHulld) -> None:
+def test_calls_that_are_safe_to_repeat_are_retried(caller: Any, fake: FakeHulld) -> None:
     fake.script = [unavailable, busy, unavailable]
     assert caller.get_status().version == "fake"
     assert len(fake.calls) == 4
@@ -77,7 +77,7 @@ def test_attempts_are_counted(caller: Any, fake: FakeHulld) -> None:
     assert len(fake.calls) == QUICK.max_attempts and caught.value.reason == "DRAINING"
 
 
-def test_what_may_not_be_repeated_is_not(caller: Any, fake: FakeHulld) -> None:
+def test_other_calls_are_not_retried(caller: Any, fake: FakeHulld) -> None:
     for call in (lambda: caller.delete_hull("a"), lambda: caller.create_hull("a")):
         fake.calls.clear()
         fake.script = [unavailable]
@@ -89,7 +89,7 @@ def test_what_may_not_be_repeated_is_not(caller: Any, fake: FakeHulld) -> None:
     assert caller.create_hull("a", if_absent=True).created and len(fake.calls) == 2
 
 
-def test_a_limit_without_a_hint_is_final(caller: Any, fake: FakeHulld) -> None:
+def test_a_limit_without_a_retry_hint_is_final(caller: Any, fake: FakeHulld) -> None:
     fake.script = [full]
     with pytest.raises(hulld.ResourceExhaustedError) as caught:
         caller.get_status()
@@ -99,7 +99,7 @@ def test_a_limit_without_a_hint_is_final(caller: Any, fake: FakeHulld) -> None:
     assert str(error) == "RESOURCE_EXHAUSTED: too many hulls (LIMIT_EXCEEDED, request fake-1)"
 
 
-def test_a_hint_beyond_the_deadline_is_not_waited_for(connect: Any, fake: FakeHulld) -> None:
+def test_a_retry_hint_beyond_the_deadline_ends_the_call(connect: Any, fake: FakeHulld) -> None:
     client = connect(fake.address, timeout=5)
     fake.script = [
         lambda context: refuse(
@@ -122,7 +122,7 @@ def test_no_server_is_unavailable(connect: Any, tmp_path: Any) -> None:
     assert caught.value.reason is None and caught.value.request_id is None
 
 
-def test_calls_go_round_and_to_those_that_are_left(connect: Any, fake: FakeHulld) -> None:
+def test_calls_alternate_between_the_servers_that_remain(connect: Any, fake: FakeHulld) -> None:
     with FakeHulld() as other:
         client = connect(f"{fake.address},{other.address}", retry=QUICK, timeout=20)
         while not (fake.calls and other.calls):
@@ -137,13 +137,13 @@ def test_calls_go_round_and_to_those_that_are_left(connect: Any, fake: FakeHulld
     assert len(fake.calls) - before[0] == 20
 
 
-def test_a_mesh_that_breaks_off_is_read_again(caller: Any, fake: FakeHulld) -> None:
+def test_an_interrupted_mesh_is_read_again(caller: Any, fake: FakeHulld) -> None:
     fake.script = [lambda context: None, unavailable]
     assert caller.get_hull_mesh("a").vertices.tolist() == [[0, 0, 0], [1, 1, 1]]
     assert len(fake.calls) == 2
 
 
-def test_the_token_goes_with_every_call(connect: Any, fake: FakeHulld) -> None:
+def test_every_call_carries_the_token(connect: Any, fake: FakeHulld) -> None:
     client = connect(fake.address, token="secret", retry=QUICK)
     client.get_status()
     client.get_hull_mesh("a")
@@ -179,7 +179,7 @@ def test_a_lost_connection_applies_each_chunk_once(caller: Any, fake: FakeHulld)
 
 
 @pytest.mark.parametrize("change", ["store_id", "create_revision", "missing"])
-def test_another_hull_is_not_appended_to(caller: Any, fake: FakeHulld, change: str) -> None:
+def test_an_append_never_continues_on_a_new_hull(caller: Any, fake: FakeHulld, change: str) -> None:
     def replace(sequence: int, context: Any) -> None:
         if sequence == 2:
             setattr(
@@ -197,27 +197,27 @@ def test_another_hull_is_not_appended_to(caller: Any, fake: FakeHulld, change: s
             appender.append(np.zeros((1, 3)))
 
 
-def test_an_append_gives_up_where_nothing_moves_on(caller: Any, fake: FakeHulld) -> None:
+def test_an_append_without_progress_gives_up(caller: Any, fake: FakeHulld) -> None:
     fake.before = lambda sequence, context: unavailable(context)
     with pytest.raises(hulld.UnavailableError):
         caller.append_points("a", np.zeros((1, 3)), create=True)
     assert len(fake.calls) == QUICK.max_attempts and fake.chunks == {}
 
 
-def test_an_append_that_is_refused_is_not_repeated(caller: Any, fake: FakeHulld) -> None:
+def test_a_refused_append_is_not_retried(caller: Any, fake: FakeHulld) -> None:
     fake.before = lambda sequence, context: full(context)
     with pytest.raises(hulld.ResourceExhaustedError):
         caller.append_points("a", np.zeros((1, 3)), create=True)
     assert len(fake.calls) == 1
 
 
-def test_an_opening_is_tried_again(caller: Any, fake: FakeHulld) -> None:
+def test_opening_an_append_is_retried(caller: Any, fake: FakeHulld) -> None:
     fake.script = [unavailable, busy]
     assert caller.append_points("a", np.zeros((4, 3)), create=True).points_acknowledged == 4
     assert len(fake.calls) == 3
 
 
-def test_a_server_that_says_nothing_is_not_waited_for(connect: Any, fake: FakeHulld) -> None:
+def test_a_silent_server_is_a_timeout(connect: Any, fake: FakeHulld) -> None:
     release = threading.Event()
     fake.before = lambda sequence, context: release.wait(60) and None
     client = connect(fake.address, timeout=0.2, retry=QUICK)
@@ -228,7 +228,7 @@ def test_a_server_that_says_nothing_is_not_waited_for(connect: Any, fake: FakeHu
         release.set()
 
 
-def test_a_server_that_reads_no_further_is_not_waited_for(connect: Any, fake: FakeHulld) -> None:
+def test_a_server_that_stops_reading_is_a_timeout(connect: Any, fake: FakeHulld) -> None:
     release = threading.Event()
     gave_up: list[int] = []
 
@@ -247,7 +247,7 @@ def test_a_server_that_reads_no_further_is_not_waited_for(connect: Any, fake: Fa
         release.set()
 
 
-def test_a_task_that_is_cancelled_while_it_writes_ends(fake: FakeHulld) -> None:
+def test_a_task_that_is_cancelled_while_writing_ends(fake: FakeHulld) -> None:
     release = threading.Event()
     fake.before = lambda sequence, context: release.wait(60) and None
 
@@ -267,7 +267,7 @@ def test_a_task_that_is_cancelled_while_it_writes_ends(fake: FakeHulld) -> None:
         release.set()
 
 
-def test_a_writer_numbers_on(caller: Any, fake: FakeHulld) -> None:
+def test_a_writer_continues_its_sequence(caller: Any, fake: FakeHulld) -> None:
     fake.chunks = {1: 5, 2: 5}
     caller.append_points("a", np.zeros((7, 3)), writer_id="lab")
     assert fake.chunks == {1: 5, 2: 5, 3: 7}
@@ -276,14 +276,14 @@ def test_a_writer_numbers_on(caller: Any, fake: FakeHulld) -> None:
 # --- Watches ---
 
 
-def test_a_watch_goes_on_where_it_was(caller: Any, fake: FakeHulld) -> None:
+def test_a_watch_resumes_where_it_was(caller: Any, fake: FakeHulld) -> None:
     with caller.watch_hulls() as watch:
         seen = [next(watch).header.revision for _ in range(3)]
     assert seen == [10, 20, 30]
     assert fake.calls[:3] == ["WatchHulls after 0", "WatchHulls after 10", "WatchHulls after 20"]
 
 
-def test_a_watch_that_is_refused_says_why(caller: Any, fake: FakeHulld) -> None:
+def test_a_refused_watch_raises_the_reason(caller: Any, fake: FakeHulld) -> None:
     fake.script = [full]
     with pytest.raises(hulld.ResourceExhaustedError, match="too many hulls"):
         next(iter(caller.watch_hulls()))
@@ -303,7 +303,7 @@ class LostAfterAnHour(grpc.RpcError):
         return None
 
 
-def test_a_watch_that_was_quiet_for_long_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_watch_resumes_after_a_long_quiet_time(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = [0.0]
     passing = types.SimpleNamespace(monotonic=lambda: clock[0])
     monkeypatch.setattr("hulld.calls.attempts.time", passing)
@@ -314,13 +314,13 @@ def test_a_watch_that_was_quiet_for_long_goes_on(monkeypatch: pytest.MonkeyPatch
         """Sends one message, and loses the connection an hour later."""
 
         def __init__(self, call: Any) -> None:
-            self.told = False
+            self.was_notified = False
 
         def __next__(self) -> bytes:
-            if self.told:
+            if self.was_notified:
                 clock[0] += 3600
                 raise LostAfterAnHour
-            self.told = True
+            self.was_notified = True
             message = hull_pb2.WatchHullsResponse(synced=True)
             message.header.revision = next(revisions)
             return bytes(message.SerializeToString())
@@ -371,14 +371,14 @@ def test_an_error_has_the_class_of_its_status() -> None:
     assert isinstance(from_status("INVALID_ARGUMENT", "", None), ValueError)
 
 
-def test_details_of_others_and_malformed_ones_are_left_out() -> None:
+def test_foreign_and_malformed_details_are_ignored() -> None:
     assert from_status("UNAVAILABLE", "", [("grpc-status-details-bin", b"\xff\xff")]).reason is None
     for hint, seconds in (("1500", 1.5), ("-1", None), ("soon", None)):
         error = from_status("RESOURCE_EXHAUSTED", "", [("grpc-retry-pushback-ms", hint)])
         assert error.retry_after == seconds and may_retry(error) == (seconds is not None)
 
 
-def test_errors_travel_between_processes() -> None:
+def test_errors_can_be_pickled() -> None:
     error = hulld.NotFoundError(
         "no", reason="HULL_NOT_FOUND", metadata={"hull_id": "a"}, request_id="7"
     )
@@ -387,7 +387,7 @@ def test_errors_travel_between_processes() -> None:
     assert again.metadata == {"hull_id": "a"}
 
 
-def test_waits_double_and_keep_to_what_the_server_asks() -> None:
+def test_waits_double_and_respect_the_hint_of_the_server() -> None:
     policy = hulld.RetryPolicy(max_attempts=9, initial_backoff=0.1, max_backoff=0.5)
     error = hulld.UnavailableError("")
     waits = [policy.wait_after(n, error, None) for n in range(1, 6)]

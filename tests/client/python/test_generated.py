@@ -30,7 +30,7 @@ def test_the_installed_modules_are_those_of_this_source(tmp_path: pathlib.Path) 
         assert made == (installed / f"{module}.py").read_text(encoding="utf-8"), module
 
 
-def test_nothing_in_them_blocks(tmp_path: pathlib.Path) -> None:
+def test_no_generated_module_blocks(tmp_path: pathlib.Path) -> None:
     script = generator()
     script.generate(PACKAGE / "hulld", tmp_path)
     for module in script.MODULES:

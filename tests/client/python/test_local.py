@@ -35,7 +35,7 @@ def test_it_serves_asyncio_too() -> None:
     assert asyncio.run(ask()) == "TOUCHING"
 
 
-def test_hulls_stay_where_a_directory_keeps_them(tmp_path: pathlib.Path) -> None:
+def test_hulls_persist_in_a_data_directory(tmp_path: pathlib.Path) -> None:
     for expected in ([], ["a"]):
         with hulld.local(data_dir=tmp_path / "hulls") as client:
             assert [hull.hull_id for hull in client.list_hulls()] == expected
@@ -51,7 +51,7 @@ def test_options_are_flags_of_the_server() -> None:
         assert caught.value.metadata == {"flag": "max-hulls", "limit": "1"}
 
 
-def test_a_server_that_does_not_start_says_why() -> None:
+def test_a_server_that_does_not_start_raises_the_reason() -> None:
     with pytest.raises(RuntimeError, match="max-hulls"):
         hulld.LocalServer(options=["--max-hulls", "many"]).start()
 

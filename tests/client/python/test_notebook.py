@@ -70,7 +70,7 @@ def test_a_browser_fills_the_frames_of_all_cells(
     assert [html.unescape(one) for one in filled] == pages
 
 
-def test_without_hullctl_a_table_says_so(
+def test_without_hullctl_a_table_is_shown(
     either: Any, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     either.append_points(name, CUBE, create=True)
@@ -79,14 +79,14 @@ def test_without_hullctl_a_table_says_so(
     assert "<table>" in shown and "<iframe" not in shown and "HULLCTL_BINARY" in shown
 
 
-def test_a_hull_that_is_gone_is_no_error(either: Any, name: str) -> None:
+def test_a_deleted_hull_is_not_an_error(either: Any, name: str) -> None:
     either.append_points(name, CUBE, create=True)
     answer = either.check_collision(name, name)
     either.delete_hull(name)
     assert "No picture" in answer._repr_html_() and "OVERLAPPING" in answer._repr_html_()
 
 
-def test_names_are_text_and_no_markup() -> None:
+def test_names_are_escaped() -> None:
     shown = Viewer.absent("<b>why</b>").html([("<i>", "<script>"), ("none", None)], ["a"])
     assert "<script>" not in shown and "<i>" not in shown and "<b>" not in shown
     assert "&lt;script&gt;" in shown and "none" not in shown

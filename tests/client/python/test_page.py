@@ -15,7 +15,7 @@ PAGE = SOURCE / "client/python/README.md"
 
 
 @pytest.mark.parametrize("page", [PAGE, SOURCE / "README.md"])
-def test_the_page_does_what_it_says(
+def test_the_code_of_the_page_runs(
     page: pathlib.Path, tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     robots = (SOURCE / "client/guide/ROBOTS.md").read_text(encoding="utf-8")

@@ -43,7 +43,7 @@ def test_rows_of_different_lengths_are_named() -> None:
         hulld.as_points([[1, 2, 3], [1, 2]])
 
 
-def test_integers_pass_where_a_double_holds_them() -> None:
+def test_integers_are_accepted_if_a_double_represents_them() -> None:
     exact = np.array([[2**53, -(2**60), 2**62]])
     assert hulld.as_points(exact).tolist() == [[2.0**53, -(2.0**60), 2.0**62]]
     assert hulld.as_points(np.array([[1, 2, 3]], np.int8)).tolist() == [[1, 2, 3]]
@@ -60,7 +60,7 @@ def test_long_doubles_are_not_rounded_silently() -> None:
     assert hulld.as_points(np.array([[0, 0, 0.5]], np.longdouble)).tolist() == [[0, 0, 0.5]]
 
 
-def test_what_are_no_numbers_is_refused() -> None:
+def test_values_that_are_not_numbers_are_refused() -> None:
     for bad in (np.array([["a", "b", "c"]]), np.zeros((1, 3), complex)):
         with pytest.raises(TypeError, match="not numbers"):
             hulld.as_points(bad)

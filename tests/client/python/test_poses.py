@@ -79,7 +79,7 @@ def test_a_rotation_comes_back_within_rounding(rng: np.random.Generator) -> None
     assert {int(i) for i in np.argmax(np.abs(packed[:, :4]), axis=1)} == {0, 1, 2, 3}
 
 
-def test_a_matrix_that_is_not_orthogonal_is_told_how_far_off_it_is() -> None:
+def test_the_error_states_how_far_a_matrix_is_from_orthogonal() -> None:
     with pytest.raises(ValueError, match=r"from the identity by 0\.0201, and at most 1e-09"):
         hulld.Pose.from_matrix(matrix(np.diag([1.01, 1, 1])))
     many = np.tile(np.eye(4), (10, 1, 1))
@@ -90,7 +90,7 @@ def test_a_matrix_that_is_not_orthogonal_is_told_how_far_off_it_is() -> None:
         hulld.pack_poses([None, many[7]])
 
 
-def test_a_tolerance_is_the_callers_to_give() -> None:
+def test_the_caller_chooses_the_tolerance() -> None:
     rough = matrix(np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0])
     rough[:3, :3] *= np.sign(np.linalg.det(rough[:3, :3]))
     rough = rough.astype(np.float32).astype(float)
@@ -111,12 +111,12 @@ def test_a_tolerance_is_the_callers_to_give() -> None:
         (np.diag([1e200, 1, 1, 1]), "deviates from the identity by inf"),
     ],
 )
-def test_what_is_no_motion_is_refused(bad: np.ndarray, message: str) -> None:
+def test_invalid_matrices_are_refused(bad: np.ndarray, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         hulld.Pose.from_matrix(bad)
 
 
-def test_numbers_that_no_double_holds_are_refused() -> None:
+def test_numbers_that_no_double_represents_are_refused() -> None:
     with pytest.raises(ValueError, match=rf"pose\[0\] is {2**53 + 1}, which no double represents"):
         hulld.pack_poses([np.array([2**53 + 1, 0, 0])])
     with pytest.raises(ValueError, match="no double represents"):

@@ -57,7 +57,7 @@ def test_an_import_loads_only_the_modules_that_are_used() -> None:
         hulld.AsyncNothing
 
 
-def test_a_forked_child_is_told_how_to_start_processes(client: hulld.Client, name: str) -> None:
+def test_a_forked_child_gets_an_error_with_advice(client: hulld.Client, name: str) -> None:
     client.append_points(name, CUBE, create=True)
     stream = client.stream_collisions([name, name])
     appender = client.open_append(name)
@@ -130,7 +130,7 @@ async def ask_a_new_client(address: str) -> None:
         await client.get_status()
 
 
-def test_an_asynchronous_client_is_told_the_same(server: hulld.LocalServer) -> None:
+def test_an_asynchronous_client_gets_the_same_error(server: hulld.LocalServer) -> None:
     async def fork_and_ask() -> str:
         async with hulld.AsyncClient(server.address) as client:
             await client.get_status()
@@ -154,7 +154,7 @@ def test_an_asynchronous_client_is_told_the_same(server: hulld.LocalServer) -> N
     assert "open hulld client" in asyncio.run(fork_and_ask())
 
 
-def test_a_closed_client_says_so(connect: Any, server: hulld.LocalServer) -> None:
+def test_a_closed_client_raises_an_error(connect: Any, server: hulld.LocalServer) -> None:
     client = connect(server.address)
     client.get_status()
     client.close()

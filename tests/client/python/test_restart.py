@@ -92,7 +92,7 @@ def outlive_a_restart(server: Restartable, *calls: Callable[[], Any]) -> list[An
         return [answer.result() for answer in answers]
 
 
-def test_every_safe_call_outlives_a_restart(connect: Any, running: Restartable) -> None:
+def test_safe_calls_survive_a_restart(connect: Any, running: Restartable) -> None:
     client = connect(running.address, timeout=TIMEOUT)
     client.append_points("cube", CUBE, create=True)
     client.put_body("body", ["cube"])
@@ -113,7 +113,7 @@ def test_every_safe_call_outlives_a_restart(connect: Any, running: Restartable) 
     )
 
 
-def test_an_open_append_goes_on_after_a_restart(connect: Any, running: Restartable) -> None:
+def test_an_open_append_continues_after_a_restart(connect: Any, running: Restartable) -> None:
     client = connect(running.address, timeout=TIMEOUT)
     with client.open_append("cube", create=True) as appender:
         appender.append(CUBE[:4])
@@ -143,7 +143,7 @@ def test_a_call_that_is_not_safe_to_repeat_is_sent_once(connect: Any, running: R
     assert [hull.hull_id for hull in client.list_hulls()] == ["cube"]
 
 
-def test_hullctl_waits_for_a_server_as_long_as_it_is_told(running: Restartable) -> None:
+def test_hullctl_waits_for_a_server_until_its_timeout(running: Restartable) -> None:
     program = str(hulld.find_program("hullctl"))
 
     def hullctl(*arguments: str) -> subprocess.CompletedProcess[str]:

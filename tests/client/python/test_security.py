@@ -140,7 +140,7 @@ def test_tls_with_certificates_and_tokens(
                 connect(server.address, tls=wrong, retry=once, timeout=10).get_status()
 
 
-def test_a_token_is_not_sent_where_all_can_read_it() -> None:
+def test_a_token_is_not_sent_unencrypted() -> None:
     with pytest.raises(ValueError, match="unencrypted to hulld.example:1"):
         hulld.Client("hulld.example:1", token="secret")
     hulld.Client("hulld.example:1", token="secret", insecure=True).close()
@@ -163,7 +163,7 @@ def test_a_token_is_not_sent_where_all_can_read_it() -> None:
         ("hulld.example:1", False),
     ],
 )
-def test_only_this_machine_is_this_machine(server: str, here: bool) -> None:
+def test_only_loopback_addresses_are_on_this_machine(server: str, here: bool) -> None:
     assert is_loopback(server) == here
 
 
@@ -175,7 +175,7 @@ def test_only_this_machine_is_this_machine(server: str, here: bool) -> None:
         ("10.0.0.1:1,", "is not ADDRESS:PORT"),
     ],
 )
-def test_lists_that_cannot_be_say_what_can(servers: str, problem: str) -> None:
+def test_malformed_server_lists_are_refused(servers: str, problem: str) -> None:
     with pytest.raises(ValueError, match=problem):
         hulld.Client(servers)
 
@@ -185,7 +185,7 @@ def test_a_certificate_for_several_addresses_needs_a_name() -> None:
         hulld.Client("10.0.0.1:1,10.0.0.2:1", tls=hulld.Tls())
 
 
-def test_a_token_file_is_for_its_owner_alone(tmp_path: pathlib.Path) -> None:
+def test_a_token_file_must_be_private(tmp_path: pathlib.Path) -> None:
     file = tmp_path / "token"
     file.write_text("secret\n")
     file.chmod(0o644)

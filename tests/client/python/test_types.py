@@ -40,7 +40,7 @@ def test_the_examples_are_typed(tmp_path: pathlib.Path) -> None:
     assert done.returncode == 0, done.stdout
 
 
-def test_a_users_mistakes_are_seen(tmp_path: pathlib.Path) -> None:
+def test_a_type_checker_finds_the_mistakes_of_users(tmp_path: pathlib.Path) -> None:
     (tmp_path / "user.py").write_text(
         "import hulld\n"
         "with hulld.local() as client:\n"

@@ -119,7 +119,7 @@ def test_batches_scenes_and_streams_are_proven(client: hulld.Client, row: str, c
         assert set(step.piece_hulls) == {cube}
 
 
-def test_what_changed_since_is_said(client: hulld.Client, row: str, cube: str) -> None:
+def test_changes_since_the_answer_are_reported(client: hulld.Client, row: str, cube: str) -> None:
     verifier = hulld.Verifier(client)
     answer = client.check_collision(row, cube, certificate=True)
     client.put_body(row, [cube])

@@ -64,7 +64,7 @@ def test_points_are_what_protobuf_reads() -> None:
     assert struct.pack("<9f", *read.xyz_float) == floats.tobytes() and not read.xyz
 
 
-def test_other_strides_and_byte_orders_say_the_same_numbers(rng: np.random.Generator) -> None:
+def test_other_strides_and_byte_orders_give_the_same_numbers(rng: np.random.Generator) -> None:
     points = rng.normal(size=(20, 6))
     expected = point_block(as_points(np.ascontiguousarray(points[::-2, ::2]))).finish()
     assert point_block(as_points(points[::-2, ::2])).finish() == expected
@@ -127,17 +127,17 @@ def test_arrays_have_the_names_of_the_contract() -> None:
 @pytest.mark.parametrize(
     "data", [b"\x0a\x05abc", b"\x08", b"\x08\xff", b"\x0b", b"\x02\x00", b"\x11abc"]
 )
-def test_what_is_cut_off_or_no_message_is_refused(data: bytes) -> None:
+def test_truncated_and_malformed_messages_are_refused(data: bytes) -> None:
     with pytest.raises(WireError):
         list(read_fields(data))
 
 
 @pytest.mark.parametrize("data", [b"\x80", b"\x01\xff", b"\xff" * 11 + b"\x01"])
-def test_varints_that_do_not_end_are_refused(data: bytes) -> None:
+def test_unterminated_varints_are_refused(data: bytes) -> None:
     with pytest.raises(WireError):
         packed_varints(memoryview(data))
 
 
-def test_doubles_that_are_cut_off_are_refused() -> None:
+def test_truncated_doubles_are_refused() -> None:
     with pytest.raises(WireError):
         packed_doubles(memoryview(b"1234567"))

@@ -260,7 +260,7 @@ TEST(CertificateCheck, PointsInAnyOrderAreFoundByTheirCoordinates) {
   EXPECT_THAT(std::string(check(false).message()), HasSubstr("pairs[0].a is vertex 7"));
   pair.mutable_vertex_a()->set_x(2);
   EXPECT_THAT(std::string(check(true).message()),
-              HasSubstr("pairs[0].a is none of the points of its inline shape"));
+              HasSubstr("pairs[0].a is not one of the points of its inline shape"));
 }
 
 TEST(CertificateCheck, EmptyHullsAreSeparatedWithoutProof) {

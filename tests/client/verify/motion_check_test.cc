@@ -204,7 +204,7 @@ TEST(MotionCheck, AdjacentDoublesBracketATimeThatIsNotADouble) {
   ExpectInvalid(claim(below, below), a, b, "contact: the certificate has 6 vertex pairs");
   Claim grazes = claim(below, above);
   grazes.relation = kTouching;
-  ExpectInvalid(grazes, a, b, "they do not only touch");
+  ExpectInvalid(grazes, a, b, "they do not merely touch");
 }
 
 TEST(MotionCheck, AGrazeNeverOverlaps) {

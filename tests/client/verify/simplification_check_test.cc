@@ -32,12 +32,13 @@ constexpr int kManyPoints = 20'000;
 constexpr int kRounds = 60;
 #endif
 
-v1::Simplification Asked(v1::SimplificationSide side, uint64_t max_vertices, double max_error = 0) {
-  v1::Simplification asked;
-  asked.set_side(side);
-  asked.set_max_vertices(max_vertices);
-  asked.set_max_error(max_error);
-  return asked;
+v1::Simplification Requested(v1::SimplificationSide side, uint64_t max_vertices,
+                             double max_error = 0) {
+  v1::Simplification requested;
+  requested.set_side(side);
+  requested.set_max_vertices(max_vertices);
+  requested.set_max_error(max_error);
+  return requested;
 }
 
 // Returns the mesh as the server would send it.
@@ -57,15 +58,15 @@ HullMesh Claiming(double error, HullMesh mesh) {
   return mesh;
 }
 
-void ExpectValid(const v1::Simplification& asked, const HullMesh& hull,
+void ExpectValid(const v1::Simplification& requested, const HullMesh& hull,
                  const HullMesh& simplified) {
-  const absl::Status status = CheckSimplification(asked, hull, simplified);
+  const absl::Status status = CheckSimplification(requested, hull, simplified);
   EXPECT_TRUE(status.ok()) << status;
 }
 
-void ExpectInvalid(const v1::Simplification& asked, const HullMesh& hull,
+void ExpectInvalid(const v1::Simplification& requested, const HullMesh& hull,
                    const HullMesh& simplified, const std::string& why) {
-  const absl::Status status = CheckSimplification(asked, hull, simplified);
+  const absl::Status status = CheckSimplification(requested, hull, simplified);
   EXPECT_EQ(status.code(), absl::StatusCode::kFailedPrecondition);
   EXPECT_THAT(std::string(status.message()), HasSubstr(why));
 }
@@ -82,12 +83,12 @@ HullMesh TetrahedronInCube() {
 TEST(SimplificationCheck, DecidesADistanceToTheLastBit) {
   const HullMesh cube = BoxHull({0, 0, 0}, {2, 2, 2});
   const double distance = 2 / std::sqrt(3.0);
-  const v1::Simplification inside = Asked(kInside, 4);
+  const v1::Simplification inside = Requested(kInside, 4);
   ExpectValid(inside, cube, Claiming(std::nextafter(distance, 2), TetrahedronInCube()));
   ExpectInvalid(inside, cube, Claiming(std::nextafter(distance, 1), TetrahedronInCube()),
                 "of the hull is farther than 1.15470053837925");
   // Corners of the larger box are sqrt(3) away from those of the cube.
-  const v1::Simplification outside = Asked(kOutside, 8);
+  const v1::Simplification outside = Requested(kOutside, 8);
   const HullMesh box = BoxHull({-1, -1, -1}, {3, 3, 3});
   ExpectValid(outside, cube, Claiming(std::nextafter(std::sqrt(3.0), 2), box));
   ExpectInvalid(outside, cube, Claiming(std::nextafter(std::sqrt(3.0), 1), box),
@@ -95,7 +96,7 @@ TEST(SimplificationCheck, DecidesADistanceToTheLastBit) {
 }
 
 TEST(SimplificationCheck, DistinguishesInsideFromOutsideToTheLastBit) {
-  const v1::Simplification outside = Asked(kOutside, 8);
+  const v1::Simplification outside = Requested(kOutside, 8);
   const HullMesh box = Claiming(2, BoxHull({0, 0, 0}, {2, 2, 2}));
   ExpectValid(outside, BoxHull({0, 0, kLeast}, {2, 1.5, 2}), box);
   ExpectInvalid(outside, BoxHull({0, 0, -kLeast}, {2, 1.5, 2}), box,
@@ -104,27 +105,29 @@ TEST(SimplificationCheck, DistinguishesInsideFromOutsideToTheLastBit) {
                 "is not in the simplification");
   HullMesh moved = TetrahedronInCube();
   moved.xyz[3] = std::nextafter(2.0, 0.0);
-  ExpectInvalid(Asked(kInside, 4), BoxHull({0, 0, 0}, {2, 2, 2}), Claiming(2, moved),
+  ExpectInvalid(Requested(kInside, 4), BoxHull({0, 0, 0}, {2, 2, 2}), Claiming(2, moved),
                 "vertex 1 of the simplification is not a vertex of the hull");
 }
 
 TEST(SimplificationCheck, ChecksTheRequestedLimits) {
   const HullMesh cube = BoxHull({0, 0, 0}, {2, 2, 2});
   const HullMesh simple = Claiming(1.5, TetrahedronInCube());
-  ExpectInvalid(Asked(kInside, 3), cube, simple, "has 4 vertices; at most 3 were requested");
-  ExpectInvalid(Asked(kInside, 0, 1.25), cube, simple,
+  ExpectInvalid(Requested(kInside, 3), cube, simple, "has 4 vertices; at most 3 were requested");
+  ExpectInvalid(Requested(kInside, 0, 1.25), cube, simple,
                 "the error is 1.5; at most 1.25 was requested");
-  ExpectValid(Asked(kInside, 0, 1.5), cube, simple);
+  ExpectValid(Requested(kInside, 0, 1.5), cube, simple);
   // With both limits, the nearest that the server finds is accepted.
-  ExpectValid(Asked(kInside, 4, 1.25), cube, simple);
-  ExpectInvalid(Asked(kInside, 4), cube, TetrahedronInCube(), "states no error");
-  ExpectInvalid(Asked(kInside, 4), cube, Claiming(NAN, TetrahedronInCube()), "is not a distance");
-  ExpectInvalid(Asked(kInside, 4), cube, Claiming(-1, TetrahedronInCube()), "is not a distance");
+  ExpectValid(Requested(kInside, 4, 1.25), cube, simple);
+  ExpectInvalid(Requested(kInside, 4), cube, TetrahedronInCube(), "contains no error");
+  ExpectInvalid(Requested(kInside, 4), cube, Claiming(NAN, TetrahedronInCube()),
+                "is not a distance");
+  ExpectInvalid(Requested(kInside, 4), cube, Claiming(-1, TetrahedronInCube()),
+                "is not a distance");
 }
 
 TEST(SimplificationCheck, SurvivesNonsensicalMeshes) {
   const HullMesh cube = BoxHull({0, 0, 0}, {2, 2, 2});
-  const v1::Simplification inside = Asked(kInside, 8);
+  const v1::Simplification inside = Requested(kInside, 8);
   ExpectValid(inside, {}, Claiming(0, {}));
   ExpectInvalid(inside, cube, Claiming(9, {}), "empty");
   ExpectInvalid(inside, {}, Claiming(9, cube), "empty");
@@ -169,10 +172,11 @@ TEST(SimplificationCheck, AgreesWithTheServer) {
              {8, 0}, {30, 0}, {0, 0.3 * size}, {0, 1e-3 * size}, {20, 0.1 * size}}) {
       const auto inside = SimplifyInside(hull, {most, error, {}});
       ASSERT_TRUE(inside.ok()) << inside.status();
-      ExpectValid(Asked(kInside, most, error), mesh, Claiming(inside->error, MeshOf(inside->hull)));
+      ExpectValid(Requested(kInside, most, error), mesh,
+                  Claiming(inside->error, MeshOf(inside->hull)));
       const auto outside = SimplifyOutside(hull, {most, error, {}});
       ASSERT_TRUE(outside.ok()) << outside.status();
-      ExpectValid(Asked(kOutside, most, error), mesh,
+      ExpectValid(Requested(kOutside, most, error), mesh,
                   Claiming(outside->error, MeshOf(outside->hull)));
     }
   }
@@ -206,7 +210,7 @@ TEST(SimplificationCheck, AgreesWithTheOracle) {
           truth = truth && (!is_inside || testing::Value(of_hull, testing::Contains(v)));
         }
         const absl::Status status =
-            CheckSimplification(Asked(is_inside ? kInside : kOutside, 100), MeshOf(hull),
+            CheckSimplification(Requested(is_inside ? kInside : kOutside, 100), MeshOf(hull),
                                 Claiming(bound, MeshOf(claimed)));
         EXPECT_EQ(status.ok(), truth) << status << " round " << round << " bound " << bound;
         ++(truth ? valid : invalid);
@@ -224,19 +228,19 @@ TEST(SimplificationCheck, HandlesManyVertices) {
   const auto inside = SimplifyInside(hull, {kManyPoints / 20, 0, {}});
   const auto outside = SimplifyOutside(hull, {kManyPoints / 20, 0, {}});
   ASSERT_TRUE(inside.ok() && outside.ok());
-  const v1::Simplification asked_inside = Asked(kInside, kManyPoints / 20);
-  const v1::Simplification asked_outside = Asked(kOutside, kManyPoints / 20);
+  const v1::Simplification requested_inside = Requested(kInside, kManyPoints / 20);
+  const v1::Simplification requested_outside = Requested(kOutside, kManyPoints / 20);
   HullMesh within = Claiming(inside->error, MeshOf(inside->hull));
   HullMesh around = Claiming(outside->error, MeshOf(outside->hull));
-  ExpectValid(asked_inside, mesh, within);
-  ExpectValid(asked_outside, mesh, around);
+  ExpectValid(requested_inside, mesh, within);
+  ExpectValid(requested_outside, mesh, around);
   within.header.set_error(inside->error * (1 - 1e-6));
   around.header.set_error(outside->error * (1 - 1e-6));
-  ExpectInvalid(asked_inside, mesh, within, "of the hull is farther than");
-  ExpectInvalid(asked_outside, mesh, around, "of the simplification is farther than");
+  ExpectInvalid(requested_inside, mesh, within, "of the hull is farther than");
+  ExpectInvalid(requested_outside, mesh, around, "of the simplification is farther than");
   around = Claiming(outside->error, MeshOf(outside->hull));
   for (size_t axis = 0; axis < 3; ++axis) around.xyz[30 + axis] *= 0.9;
-  ExpectInvalid(asked_outside, mesh, around, "is not in the simplification");
+  ExpectInvalid(requested_outside, mesh, around, "is not in the simplification");
 }
 
 }  // namespace simplification_check_test

@@ -40,23 +40,23 @@ std::string AnalysisFault(const Hull& a, const Hull& b, const Answer& answer) {
 
 }  // namespace
 
-testing::AssertionResult RelationCheck::Ask(const Hull& a, const Pose& X_WA, const Hull& b,
-                                            const Pose& X_WB, Relation expected, Ways ways) {
+testing::AssertionResult RelationCheck::Verify(const Hull& a, const Pose& X_WA, const Hull& b,
+                                               const Pose& X_WB, Relation expected, Ways ways) {
   ++queries_;
   ++relations_[static_cast<size_t>(expected)];
   for (Method method : {Method::kCertifiedSearch, Method::kTextbookSat}) {
     if (method == Method::kTextbookSat && ways == kSearchOnly) continue;
-    testing::AssertionResult result = AskOnce(a, X_WA, b, X_WB, expected, method);
+    testing::AssertionResult result = VerifyOnce(a, X_WA, b, X_WB, expected, method);
     if (!result) return result;
-    result = AskOnce(b, X_WB, a, X_WA, expected, method);
+    result = VerifyOnce(b, X_WB, a, X_WA, expected, method);
     if (!result) return result << " (with the hulls swapped)";
   }
   return testing::AssertionSuccess();
 }
 
-testing::AssertionResult RelationCheck::AskOnce(const Hull& a, const Pose& X_WA, const Hull& b,
-                                                const Pose& X_WB, Relation expected,
-                                                Method method) {
+testing::AssertionResult RelationCheck::VerifyOnce(const Hull& a, const Pose& X_WA, const Hull& b,
+                                                   const Pose& X_WB, Relation expected,
+                                                   Method method) {
   const bool textbook = method == Method::kTextbookSat;
   const auto failure = [&] {
     return testing::AssertionFailure()

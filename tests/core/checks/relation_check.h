@@ -21,8 +21,8 @@ class RelationCheck {
   // True if core returns `expected` for (A, B) and (B, A) by both methods, each with a valid axis
   // and a consistent analysis, the search with a valid certificate, and also by a search for the
   // relation alone.
-  testing::AssertionResult Ask(const Hull& a, const Pose& X_WA, const Hull& b, const Pose& X_WB,
-                               Relation expected, Ways ways = kAllWays);
+  testing::AssertionResult Verify(const Hull& a, const Pose& X_WA, const Hull& b, const Pose& X_WB,
+                                  Relation expected, Ways ways = kAllWays);
 
   int queries() const { return queries_; }
   // Returns the number of queries with this relation.
@@ -34,8 +34,8 @@ class RelationCheck {
   int textbook_count(AxisKind kind) const { return textbook_kinds_[static_cast<size_t>(kind)]; }
 
  private:
-  testing::AssertionResult AskOnce(const Hull& a, const Pose& X_WA, const Hull& b, const Pose& X_WB,
-                                   Relation expected, Method method);
+  testing::AssertionResult VerifyOnce(const Hull& a, const Pose& X_WA, const Hull& b,
+                                      const Pose& X_WB, Relation expected, Method method);
 
   int queries_ = 0;
   std::array<int, 4> relations_ = {};

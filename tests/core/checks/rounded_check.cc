@@ -114,7 +114,7 @@ absl::StatusOr<Answer> CheckRounded(const RoundedShape& a, const RoundedShape& b
                         options, cache);
 }
 
-testing::AssertionResult RoundedCheck::Ask(const RoundedShape& a, const RoundedShape& b) {
+testing::AssertionResult RoundedCheck::Verify(const RoundedShape& a, const RoundedShape& b) {
   const auto failure = [&] {
     return testing::AssertionFailure() << Describe(a.hull, a.X_WH, b.hull, b.X_WH) << " radii "
                                        << a.radius << " " << b.radius << ": ";

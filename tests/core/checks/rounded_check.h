@@ -30,7 +30,7 @@ class RoundedCheck {
   // True if core's answers agree with brute force in exact arithmetic independent of core: the
   // relation for (A, B) and (B, A), alone, with a cache, and with details; separation, witness,
   // normal, certificate, and clearances.
-  testing::AssertionResult Ask(const RoundedShape& a, const RoundedShape& b);
+  testing::AssertionResult Verify(const RoundedShape& a, const RoundedShape& b);
 
   int count(Relation relation) const { return relations_[static_cast<size_t>(relation)]; }
   // Number of answers for the relation alone from this rung.

@@ -71,8 +71,9 @@ QueryOptions WantSeparation(std::optional<double> max_error) {
   return options;
 }
 
-testing::AssertionResult SeparationCheck::Ask(const Hull& a, const Pose& X_WA, const Hull& b,
-                                              const Pose& X_WB, std::optional<double> max_error) {
+testing::AssertionResult SeparationCheck::Verify(const Hull& a, const Pose& X_WA, const Hull& b,
+                                                 const Pose& X_WB,
+                                                 std::optional<double> max_error) {
   const auto failure = [&] { return testing::AssertionFailure() << Describe(a, X_WA, b, X_WB); };
   const Query q = {ToOracle(a.vertices()), ToOracle(X_WA), ToOracle(b.vertices()), ToOracle(X_WB)};
   QueryOptions options = WantSeparation(max_error);

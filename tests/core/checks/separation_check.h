@@ -14,8 +14,8 @@ namespace hulld {
 class SeparationCheck {
  public:
   // True if the answer for (A, B) satisfies collision.h, and the answer for (B, A) mirrors it.
-  testing::AssertionResult Ask(const Hull& a, const Pose& X_WA, const Hull& b, const Pose& X_WB,
-                               std::optional<double> max_error = std::nullopt);
+  testing::AssertionResult Verify(const Hull& a, const Pose& X_WA, const Hull& b, const Pose& X_WB,
+                                  std::optional<double> max_error = std::nullopt);
 
   int queries() const { return queries_; }
   int count(Relation relation) const { return relations_[static_cast<int>(relation)]; }

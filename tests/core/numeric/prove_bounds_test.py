@@ -27,7 +27,7 @@ def outcome(text, unit=0.125, twice=0.25):
 
 
 class ProveBounds(unittest.TestCase):
-    def test_what_follows_is_proved(self):
+    def test_a_sound_script_is_proved(self):
         self.assertIsNone(outcome(SOUND))
 
     def test_a_smaller_constant_is_refused(self):
@@ -45,7 +45,7 @@ class ProveBounds(unittest.TestCase):
     def test_a_constant_that_is_not_in_cpp_is_refused(self):
         self.assertIn('kThrice', outcome(SOUND.replace('kUnit', 'kThrice')))
 
-    def test_what_gappa_cannot_read_is_no_refusal(self):
+    def test_a_script_that_gappa_cannot_read_is_reported(self):
         self.assertIn('cannot read', outcome(SOUND.replace('->', '=>')))
 
     def test_rewriting_to_something_else_is_refused(self):

@@ -45,9 +45,9 @@ TEST(Collision, AnEmptyHullIsSeparatedFromAll) {
   const Hull empty;
   const std::vector<Vector> origin = {{0, 0, 0}};
   RelationCheck check;
-  EXPECT_TRUE(check.Ask(empty, Pose(), empty, Pose(), Relation::kSeparated));
-  EXPECT_TRUE(check.Ask(empty, Pose(), UnitCube(), Pose(), Relation::kSeparated));
-  EXPECT_TRUE(check.Ask(empty, Pose(), BuildHull(origin), At(1, 2, 3), Relation::kSeparated));
+  EXPECT_TRUE(check.Verify(empty, Pose(), empty, Pose(), Relation::kSeparated));
+  EXPECT_TRUE(check.Verify(empty, Pose(), UnitCube(), Pose(), Relation::kSeparated));
+  EXPECT_TRUE(check.Verify(empty, Pose(), BuildHull(origin), At(1, 2, 3), Relation::kSeparated));
 }
 
 // Regression test: formerly, a single call returned EXACT and a stream BOUNDS.
@@ -485,10 +485,10 @@ TEST(Collision, SumsBeyondTheRangeOfDoublesAreExact) {
   const Hull cube = BuildHull(Shifted(LatticeCube(2, 3e307), Vector::Constant(-1.5e307)));
   const double largest = std::numeric_limits<double>::max();
   RelationCheck check;
-  EXPECT_TRUE(check.Ask(cube, At(largest, largest, 0), cube, At(-largest, -largest, 0),
-                        Relation::kSeparated));
+  EXPECT_TRUE(check.Verify(cube, At(largest, largest, 0), cube, At(-largest, -largest, 0),
+                           Relation::kSeparated));
   EXPECT_TRUE(
-      check.Ask(cube, At(largest, 0, 0), cube, At(largest, 1e300, 0), Relation::kOverlapping));
+      check.Verify(cube, At(largest, 0, 0), cube, At(largest, 1e300, 0), Relation::kOverlapping));
 }
 
 }  // namespace collision_contract_test

@@ -148,22 +148,22 @@ TEST(ContactMatrix, IntegerPosesTouchExactlyAndOneStepDecides) {
     const std::vector<Vector>& a = shapes[i / shapes.size()];
     const std::vector<Vector> b = Mirrored(shapes[i % shapes.size()]);
     const Contact contact = IntegerContact(random, a, b);
-    ASSERT_TRUE(check.Ask(contact.a, contact.X_WA, contact.b, contact.X_WB, Relation::kTouching))
+    ASSERT_TRUE(check.Verify(contact.a, contact.X_WA, contact.b, contact.X_WB, Relation::kTouching))
         << "seed " << seed << " pair " << i;
     Contact gap = contact;
     Nudge(gap, 0, +1);
-    ASSERT_TRUE(check.Ask(gap.a, gap.X_WA, gap.b, gap.X_WB, Relation::kSeparated))
+    ASSERT_TRUE(check.Verify(gap.a, gap.X_WA, gap.b, gap.X_WB, Relation::kSeparated))
         << "seed " << seed << " pair " << i;
     Contact overlap = contact;
     Nudge(overlap, 0, -1);
     const Relation expected = OracleRelation(overlap.a, overlap.X_WA, overlap.b, overlap.X_WB);
-    ASSERT_TRUE(check.Ask(overlap.a, overlap.X_WA, overlap.b, overlap.X_WB, expected))
+    ASSERT_TRUE(check.Verify(overlap.a, overlap.X_WA, overlap.b, overlap.X_WB, expected))
         << "seed " << seed << " pair " << i;
     // A step along the contact: the oracle decides.
     Contact slide = contact;
     Nudge(slide, 1 + random.Below(2), random.Below(2) ? 1 : -1);
-    ASSERT_TRUE(check.Ask(slide.a, slide.X_WA, slide.b, slide.X_WB,
-                          OracleRelation(slide.a, slide.X_WA, slide.b, slide.X_WB)))
+    ASSERT_TRUE(check.Verify(slide.a, slide.X_WA, slide.b, slide.X_WB,
+                             OracleRelation(slide.a, slide.X_WA, slide.b, slide.X_WB)))
         << "seed " << seed << " pair " << i;
   }
   EXPECT_GT(check.count(Relation::kTouching), check.queries() / 3);
@@ -181,7 +181,7 @@ TEST(ContactMatrix, CommonPosesTouchExactlyAndOneStepDecides) {
     const std::vector<Vector>& a = shapes[i / shapes.size()];
     const std::vector<Vector> b = Mirrored(shapes[i % shapes.size()]);
     const Contact contact = CommonPoseContact(random, a, b);
-    ASSERT_TRUE(check.Ask(contact.a, contact.X_WA, contact.b, contact.X_WB, Relation::kTouching))
+    ASSERT_TRUE(check.Verify(contact.a, contact.X_WA, contact.b, contact.X_WB, Relation::kTouching))
         << "seed " << seed << " pair " << i;
     const Vector normal = NormalOf(contact.X_WA);
     int k = 0;
@@ -189,12 +189,12 @@ TEST(ContactMatrix, CommonPosesTouchExactlyAndOneStepDecides) {
     const int outward = normal[k] > 0 ? 1 : -1;
     Contact gap = contact;
     Nudge(gap, k, outward);
-    ASSERT_TRUE(check.Ask(gap.a, gap.X_WA, gap.b, gap.X_WB, Relation::kSeparated))
+    ASSERT_TRUE(check.Verify(gap.a, gap.X_WA, gap.b, gap.X_WB, Relation::kSeparated))
         << "seed " << seed << " pair " << i;
     Contact overlap = contact;
     Nudge(overlap, k, -outward);
     const Relation expected = OracleRelation(overlap.a, overlap.X_WA, overlap.b, overlap.X_WB);
-    ASSERT_TRUE(check.Ask(overlap.a, overlap.X_WA, overlap.b, overlap.X_WB, expected))
+    ASSERT_TRUE(check.Verify(overlap.a, overlap.X_WA, overlap.b, overlap.X_WB, expected))
         << "seed " << seed << " pair " << i;
   }
   EXPECT_GE(check.count(Relation::kTouching), check.queries() / 3);
@@ -226,7 +226,7 @@ TEST(ContactMatrix, RoundedCoordinatesAreAnsweredExactly) {
     Pose pose;
     pose.q = kRotations[random.Below(7)];
     const Relation expected = OracleRelation(hull_a, pose, hull_b, pose);
-    ASSERT_TRUE(check.Ask(hull_a, pose, hull_b, pose, expected))
+    ASSERT_TRUE(check.Verify(hull_a, pose, hull_b, pose, expected))
         << "seed " << seed << " pair " << i;
   }
   EXPECT_GT(check.count(Relation::kTouching), check.queries() / 10);
@@ -249,7 +249,7 @@ TEST(ContactMatrix, PiercingIsOverlapping) {
   const double above_one = std::nextafter(1.0, 2.0);
   RelationCheck check;
   const auto expect = [&](const Pose& pose, Relation expected) {
-    EXPECT_TRUE(check.Ask(square, Pose(), needle, pose, expected));
+    EXPECT_TRUE(check.Verify(square, Pose(), needle, pose, expected));
   };
   expect(at(0, 0, 0), Relation::kOverlapping);
   expect(at(below_one, 0, 0), Relation::kOverlapping);
@@ -264,13 +264,13 @@ TEST(ContactMatrix, PiercingIsOverlapping) {
   // Two squares that cross, share a line, or share an area.
   Pose upright;
   upright.q = {1, 1, 0, 0};
-  EXPECT_TRUE(check.Ask(square, Pose(), square, upright, Relation::kOverlapping));
+  EXPECT_TRUE(check.Verify(square, Pose(), square, upright, Relation::kOverlapping));
   upright.t = Vector(0, 0, 1);
-  EXPECT_TRUE(check.Ask(square, Pose(), square, upright, Relation::kTouching));
+  EXPECT_TRUE(check.Verify(square, Pose(), square, upright, Relation::kTouching));
   upright.t = Vector(0, 0, above_one);
-  EXPECT_TRUE(check.Ask(square, Pose(), square, upright, Relation::kSeparated));
-  EXPECT_TRUE(check.Ask(square, Pose(), square, at(1, 0.5, 0), Relation::kTouching));
-  EXPECT_TRUE(check.Ask(square, Pose(), square, at(0, 0, 5e-324), Relation::kSeparated));
+  EXPECT_TRUE(check.Verify(square, Pose(), square, upright, Relation::kSeparated));
+  EXPECT_TRUE(check.Verify(square, Pose(), square, at(1, 0.5, 0), Relation::kTouching));
+  EXPECT_TRUE(check.Verify(square, Pose(), square, at(0, 0, 5e-324), Relation::kSeparated));
 }
 
 // Points, collinear segments, and coplanar polygons against each other: flat differences of every
@@ -300,7 +300,7 @@ TEST(ContactMatrix, FlatPairsInOnePlaneTouchOrSeparate) {
     pose.t = Vector(random.Real(-9, 9), random.Real(-9, 9), 1e6);
     const Relation expected = OracleRelation(a, pose, b, pose);
     ASSERT_NE(expected, Relation::kOverlapping);
-    ASSERT_TRUE(check.Ask(a, pose, b, pose, expected)) << "seed " << seed << " round " << i;
+    ASSERT_TRUE(check.Verify(a, pose, b, pose, expected)) << "seed " << seed << " round " << i;
   }
   EXPECT_GT(check.count(Relation::kTouching), check.queries() / 8);
   EXPECT_GT(check.count(Relation::kSeparated), check.queries() / 8);

@@ -86,12 +86,12 @@ class Determinism : public testing::Test {
  protected:
   const bench::AccuracySuite suite_ = bench::MakeAccuracySuite(kStride);
 
-  Answer Ask(const bench::QuerySet::Query& query) const {
+  Answer Query(const bench::QuerySet::Query& query) const {
     return CheckCollision(suite_.hulls[query.hull_a], query.X_WA, suite_.hulls[query.hull_b],
                           query.X_WB, Everything())
         .value();
   }
-  Answer AskSwapped(const bench::QuerySet::Query& query) const {
+  Answer QuerySwapped(const bench::QuerySet::Query& query) const {
     return CheckCollision(suite_.hulls[query.hull_b], query.X_WB, suite_.hulls[query.hull_a],
                           query.X_WA, Everything())
         .value();
@@ -102,11 +102,11 @@ TEST_F(Determinism, SimdPathsGiveTheSameAnswers) {
   const OnPath fast(BestSimdPath());
   if (BestSimdPath() == SimdPath::kPortable) GTEST_SKIP() << "this machine has only one SIMD path";
   for (size_t i = 0; i < suite_.queries.size(); ++i) {
-    const Answer expected = Ask(suite_.queries[i]);
+    const Answer expected = Query(suite_.queries[i]);
     for (const SimdPath path : {SimdPath::kPortable, SimdPath::kAvx2}) {
       if (!UseSimdPath(path)) continue;
       SCOPED_TRACE(testing::Message() << suite_.kinds[i] << ", query " << i);
-      ExpectSameBits(Ask(suite_.queries[i]), expected);
+      ExpectSameBits(Query(suite_.queries[i]), expected);
     }
     UseSimdPath(BestSimdPath());
     if (HasFailure()) break;
@@ -135,8 +135,8 @@ TEST_F(Determinism, SimdPathsBuildTheSameHulls) {
 
 TEST_F(Determinism, SwappingTheHullsMirrorsEveryField) {
   for (size_t i = 0; i < suite_.queries.size(); ++i) {
-    const Answer there = Ask(suite_.queries[i]);
-    Answer back = AskSwapped(suite_.queries[i]);
+    const Answer there = Query(suite_.queries[i]);
+    Answer back = QuerySwapped(suite_.queries[i]);
     SCOPED_TRACE(testing::Message() << suite_.kinds[i] << ", query " << i);
     if (back.axis) {
       back.axis->direction = -back.axis->direction;
@@ -165,7 +165,7 @@ TEST_F(Determinism, WarmCachesChangeNoValue) {
     const bench::QuerySet::Query& query = suite_.queries[i];
     const QueryHull a(suite_.hulls[query.hull_a]);
     const QueryHull b(suite_.hulls[query.hull_b]);
-    const Answer cold = Ask(query);
+    const Answer cold = Query(query);
     PairCache cache;
     // Warmed by a nearby query, by the query itself, and by the result of both.
     Pose nearby = query.X_WB;

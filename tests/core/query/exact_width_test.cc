@@ -30,8 +30,8 @@ constexpr size_t kWidthCount = std::size(kWidths);
 // point.
 class WidthCheck {
  public:
-  testing::AssertionResult Ask(const Hull& a, const Pose& X_WA, const Hull& b, const Pose& X_WB,
-                               std::optional<Relation> expected = std::nullopt) {
+  testing::AssertionResult Verify(const Hull& a, const Pose& X_WA, const Hull& b, const Pose& X_WB,
+                                  std::optional<Relation> expected = std::nullopt) {
     const QueryHull query_a(a);
     const QueryHull query_b(b);
     const PlacedHull placed_a(query_a, X_WA);
@@ -181,7 +181,7 @@ TEST(ExactWidth, SmallIntegersAtEveryScale) {
       X_WA.t[k] = std::ldexp(t_A[k], exponent);
       X_WB.t[k] = std::ldexp(t_B[k], exponent);
     }
-    ASSERT_TRUE(check.Ask(scaled(points_a), X_WA, scaled(points_b), X_WB, expected))
+    ASSERT_TRUE(check.Verify(scaled(points_a), X_WA, scaled(points_b), X_WB, expected))
         << "seed " << seed << " round " << i;
     // Quarter and third turns take no additional bits.
     ASSERT_TRUE(check.bits().has_value() && *check.bits() <= 12) << *check.bits();
@@ -207,12 +207,12 @@ TEST(ExactWidth, CornersUpToTheLimitOfEachWidth) {
       X_WA.t = bits > 52 ? Vector(far, -far, far) : Vector(0, 0, 0);
       X_WB.t = X_WA.t;
       if (bits <= 52) X_WB.t += Vector::Constant(2 * half + step);
-      ASSERT_TRUE(check.Ask(box, X_WA, box, X_WB)) << bits << " bits, step " << step;
+      ASSERT_TRUE(check.Verify(box, X_WA, box, X_WB)) << bits << " bits, step " << step;
       if (check.bits() && *check.bits() < 400) reached[*check.bits()] = true;
       // Coordinates near the largest in opposite corners of space.
       X_WA.t = Vector(-far, far, -far);
       X_WB.t = Vector(far, -far, far) + (bits <= 52 ? Vector::Constant(step) : Vector(0, 0, 0));
-      ASSERT_TRUE(check.Ask(box, X_WA, box, X_WB)) << bits << " bits apart";
+      ASSERT_TRUE(check.Verify(box, X_WA, box, X_WB)) << bits << " bits apart";
       if (check.bits() && *check.bits() < 400) reached[*check.bits()] = true;
     }
   }
@@ -252,7 +252,7 @@ TEST(ExactWidth, WideHullsUpToTheLimitOfEachWidth) {
     for (int k = 0; k < 3; ++k) X_WB.t[k] = shift * random.Between(-1, 1);
     if (random.Below(3) == 0) X_WB.q = {1, 1, 0, 0};
     if (random.Below(3) == 0) X_WA.q = {2, 1, 0, 0};
-    ASSERT_TRUE(check.Ask(a, X_WA, b, X_WB)) << "seed " << seed << " round " << i;
+    ASSERT_TRUE(check.Verify(a, X_WA, b, X_WB)) << "seed " << seed << " round " << i;
   }
   for (const ExactWidth width : kWidths) EXPECT_GT(check.count(width), 300);
 }
@@ -289,7 +289,7 @@ TEST(ExactWidth, RotationsByAnyDoubles) {
     if (random.Below(10) == 0) X_WB.q[1] *= 0x1p-30;
     if (random.Below(10) == 0) X_WB.q[1] *= 0x1p-300;
     if (X_WB.q != X_WA.q) expected = std::nullopt;
-    ASSERT_TRUE(check.Ask(cone(1), X_WA, cone(-1), X_WB, expected))
+    ASSERT_TRUE(check.Verify(cone(1), X_WA, cone(-1), X_WB, expected))
         << "seed " << seed << " round " << i;
   }
   EXPECT_GT(check.count(ExactWidth::k5Words), 400);
@@ -317,12 +317,12 @@ TEST(ExactWidth, LargeHullsOnAGrid) {
     const Hull b = BuildHull(mirrored);
     Pose X_WA, X_WB;
     X_WB.t = Vector(random.Between(-2000, 2000), random.Between(-2000, 2000), 8400);
-    ASSERT_TRUE(check.Ask(a, X_WA, b, X_WB, Relation::kTouching))
+    ASSERT_TRUE(check.Verify(a, X_WA, b, X_WB, Relation::kTouching))
         << "seed " << seed << " round " << i;
     X_WB.t.z() += 1;
-    ASSERT_TRUE(check.Ask(a, X_WA, b, X_WB, Relation::kSeparated));
+    ASSERT_TRUE(check.Verify(a, X_WA, b, X_WB, Relation::kSeparated));
     X_WB.t.z() -= 2;
-    ASSERT_TRUE(check.Ask(a, X_WA, b, X_WB, Relation::kOverlapping));
+    ASSERT_TRUE(check.Verify(a, X_WA, b, X_WB, Relation::kOverlapping));
   }
   EXPECT_GT(check.count(ExactWidth::k1Word), 180);
 }

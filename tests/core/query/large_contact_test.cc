@@ -43,7 +43,7 @@ void ExpectRelation(const char* name, const Hull& a, const Pose& X_WA, const Hul
   std::printf("%-34s %5zu x %5zu vertices  %-11s %9.6f s\n", name, a.vertices().size(),
               b.vertices().size(), Name(answer->relation), seconds.count());
   RelationCheck check;
-  EXPECT_TRUE(check.Ask(a, X_WA, b, X_WB, expected, RelationCheck::kSearchOnly)) << name;
+  EXPECT_TRUE(check.Verify(a, X_WA, b, X_WB, expected, RelationCheck::kSearchOnly)) << name;
 }
 
 // A - v and its reflection share the origin, and v is extreme: they touch there, vertex to vertex.

@@ -22,7 +22,7 @@ constexpr int kRounds = 600;
 constexpr int kStride = 1;
 #endif
 
-Relation Ask(const Hull& a, const Pose& X_WA, const Hull& b, const Pose& X_WB) {
+Relation Query(const Hull& a, const Pose& X_WA, const Hull& b, const Pose& X_WB) {
   return CheckCollision(a, X_WA, b, X_WB).value().relation;
 }
 
@@ -48,7 +48,7 @@ class Narrowing {
     double high = 1;
     for (int step = 0; step < 53; ++step) {
       const double middle = (low + high) / 2;
-      (Ask(a_, X_WA_, b_, At(middle)) == Relation::kSeparated ? high : low) = middle;
+      (Query(a_, X_WA_, b_, At(middle)) == Relation::kSeparated ? high : low) = middle;
     }
     return low;
   }
@@ -86,14 +86,14 @@ TEST(NearContact, GenericPairsNearContactMatchTheOracle) {
     if (local != Vector::Zero()) X_WB.q = X_WA.q;
     const Vector line =
         Vector(random.Real(-1, 1), random.Real(-1, 1), random.Real(-1, 1)).normalized() * 5 * scale;
-    if (Ask(a, X_WA, b, X_WB) == Relation::kSeparated) continue;
+    if (Query(a, X_WA, b, X_WB) == Relation::kSeparated) continue;
     const Narrowing narrowing(a, X_WA, b, X_WB, line);
     const double brink = narrowing.Run();
     // From the boundary outwards and inwards, across the bounds of the floating-point stage.
     for (double step : {0.0, 0x1p-53, 0x1p-52, 0x1p-48, 0x1p-44, 0x1p-40}) {
       for (double sign : {-1.0, 1.0}) {
         const Pose there = narrowing.At(brink + sign * step);
-        ASSERT_TRUE(check.Ask(a, X_WA, b, there, OracleRelation(a, X_WA, b, there)))
+        ASSERT_TRUE(check.Verify(a, X_WA, b, there, OracleRelation(a, X_WA, b, there)))
             << "seed " << seed << " round " << round << " step " << sign * step;
       }
     }
@@ -125,7 +125,7 @@ TEST(NearContact, TinyHullsFarFromTheirOriginMatchTheOracle) {
     const Relation expected = OracleRelation(BuildHull(a), Pose(), BuildHull(b), Pose());
     const Hull tiny_a = BuildHull(Shifted(Scaled(a, unit), origin));
     const Hull tiny_b = BuildHull(Shifted(Scaled(b, unit), origin));
-    ASSERT_TRUE(check.Ask(tiny_a, pose, tiny_b, pose, expected))
+    ASSERT_TRUE(check.Verify(tiny_a, pose, tiny_b, pose, expected))
         << "seed " << seed << " round " << round;
   }
   for (Relation relation : {Relation::kSeparated, Relation::kTouching, Relation::kOverlapping}) {
@@ -137,7 +137,7 @@ TEST(NearContact, TinyHullsFarFromTheirOriginMatchTheOracle) {
 
 // Returns the number of queries of the next test: HULLD_NEAR_CONTACT_QUERIES in the environment
 // (a million in manual runs); few by default.
-int QueriesToAsk() {
+int QueryCount() {
   const char* given = std::getenv("HULLD_NEAR_CONTACT_QUERIES");
   return given != nullptr ? std::atoi(given) : kRounds;
 }
@@ -149,7 +149,7 @@ TEST(NearContact, RandomQueriesMatchTheOracle) {
   const uint64_t seed = TestSeed(904);
   Random random(seed);
   RelationCheck check;
-  for (int query = 0; query < QueriesToAsk(); ++query) {
+  for (int query = 0; query < QueryCount(); ++query) {
     const double scale = std::ldexp(1.0, random.Between(-900, 900));
     const auto points = [&](const Vector& offset) {
       std::vector<Vector> result =
@@ -170,7 +170,7 @@ TEST(NearContact, RandomQueriesMatchTheOracle) {
     const Hull b = BuildHull(
         points(Vector(random.Between(-2, 2), random.Between(-2, 2), random.Between(-2, 2))));
     const Relation expected = OracleRelation(a, X_WA, b, X_WB);
-    ASSERT_TRUE(check.Ask(a, X_WA, b, X_WB, expected, RelationCheck::kSearchOnly))
+    ASSERT_TRUE(check.Verify(a, X_WA, b, X_WB, expected, RelationCheck::kSearchOnly))
         << "seed " << seed << " query " << query;
   }
   for (Relation relation : {Relation::kSeparated, Relation::kTouching, Relation::kOverlapping}) {
@@ -228,7 +228,7 @@ TEST(NearContact, SymmetricSolidsOnALatticeMatchTheOracle) {
         X_WB.q = turns[random.Below(6)];
         X_WB.t = t;
         const Relation expected = OracleRelation(solids[i], X_WA, solids[j], X_WB);
-        ASSERT_TRUE(check.Ask(solids[i], X_WA, solids[j], X_WB, expected))
+        ASSERT_TRUE(check.Verify(solids[i], X_WA, solids[j], X_WB, expected))
             << "seed " << seed << " solids " << i << ", " << j << " t " << t.transpose();
       }
     }
@@ -251,16 +251,17 @@ TEST(NearContact, BluntConesTipToTipMatchTheirConstruction) {
     Pose X_WA, X_WB;
     X_WA.q = X_WB.q = {0.3, -0.9, 0.44, 0.1};
     X_WA.t = X_WB.t = Vector(7, 1e6, -0.3);
-    EXPECT_TRUE(check.Ask(a, X_WA, b, X_WB, Relation::kTouching, RelationCheck::kSearchOnly))
+    EXPECT_TRUE(check.Verify(a, X_WA, b, X_WB, Relation::kTouching, RelationCheck::kSearchOnly))
         << height;
     X_WA.q = X_WB.q = {1, 0, 0, 0};
     X_WA.t = X_WB.t = Vector::Zero();
     for (double step : {5e-324, 1e-300, 1e-17, 1e-13}) {
       X_WB.t.z() = step;
-      EXPECT_TRUE(check.Ask(a, X_WA, b, X_WB, Relation::kSeparated, RelationCheck::kSearchOnly))
+      EXPECT_TRUE(check.Verify(a, X_WA, b, X_WB, Relation::kSeparated, RelationCheck::kSearchOnly))
           << height << " apart by " << step;
       X_WB.t.z() = -step;
-      EXPECT_TRUE(check.Ask(a, X_WA, b, X_WB, Relation::kOverlapping, RelationCheck::kSearchOnly))
+      EXPECT_TRUE(
+          check.Verify(a, X_WA, b, X_WB, Relation::kOverlapping, RelationCheck::kSearchOnly))
           << height << " deep by " << step;
     }
   }

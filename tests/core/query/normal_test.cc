@@ -247,7 +247,7 @@ TEST(Normal, FloatingPointIsWithinItsBoundOfIntegers) {
   Random random(seed);
   constexpr int kRounds = 400;
   int in_floating_point[2] = {};
-  int asked[2] = {};
+  int counts[2] = {};
   for (int round = 0; round < kRounds; ++round) {
     const double scale = std::ldexp(1.0, random.Between(-40, 40));
     const auto hull = [&] {
@@ -274,12 +274,12 @@ TEST(Normal, FloatingPointIsWithinItsBoundOfIntegers) {
         << Describe(a, X_WA, b, X_WB);
     EXPECT_NEAR(n.norm(), 1, 1e-15);
     const int kind = found->relation == Relation::kSeparated ? 1 : 0;
-    ++asked[kind];
+    ++counts[kind];
     in_floating_point[kind] += found->normal->angle_bound > kUnitDirectionAngle ? 1 : 0;
   }
   for (const int kind : {0, 1}) {
-    EXPECT_GT(asked[kind], kRounds / 8);
-    EXPECT_GT(2 * in_floating_point[kind], asked[kind]);
+    EXPECT_GT(counts[kind], kRounds / 8);
+    EXPECT_GT(2 * in_floating_point[kind], counts[kind]);
   }
 }
 

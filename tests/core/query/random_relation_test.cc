@@ -96,7 +96,7 @@ TEST(RandomRelation, SmallIntegerHullsMatchTheOracle) {
     const Hull a = BuildHull(query.a);
     const Hull b = BuildHull(query.b);
     const Relation expected = OracleRelation(a, query.X_WA, b, query.X_WB);
-    ASSERT_TRUE(check.Ask(a, query.X_WA, b, query.X_WB, expected))
+    ASSERT_TRUE(check.Verify(a, query.X_WA, b, query.X_WB, expected))
         << "seed " << seed << " round " << round;
   }
   for (Relation relation : {Relation::kSeparated, Relation::kTouching, Relation::kOverlapping}) {
@@ -122,8 +122,8 @@ TEST(RandomRelation, ScalesAndQuaternionMultiplesChangeNothing) {
     const double scale = std::ldexp(1.0, random.Between(-1073, 1020));
     for (double& q : X_WA.q) q *= std::array{-1.0, 3.0, 0x1p-1074, 0x1p1020}[round % 4];
     for (double& q : X_WB.q) q *= std::array{7.0, 1.0, 0x1p500, 0x1p-500, -0x1p-1060}[round % 5];
-    ASSERT_TRUE(check.Ask(BuildHull(hulld::Scaled(a, scale)), Scaled(X_WA, scale),
-                          BuildHull(hulld::Scaled(b, scale)), Scaled(X_WB, scale), expected))
+    ASSERT_TRUE(check.Verify(BuildHull(hulld::Scaled(a, scale)), Scaled(X_WA, scale),
+                             BuildHull(hulld::Scaled(b, scale)), Scaled(X_WB, scale), expected))
         << "seed " << seed << " round " << round;
   }
 }
@@ -156,7 +156,7 @@ TEST(RandomRelation, NearlyDegenerateHullsMatchTheOracle) {
     const Hull b = rounded(query.b);
     const Pose X_WA = nudged(query.X_WA);
     const Pose X_WB = nudged(query.X_WB);
-    ASSERT_TRUE(check.Ask(a, X_WA, b, X_WB, OracleRelation(a, X_WA, b, X_WB)))
+    ASSERT_TRUE(check.Verify(a, X_WA, b, X_WB, OracleRelation(a, X_WA, b, X_WB)))
         << "seed " << seed << " round " << round;
   }
   for (Relation relation : {Relation::kSeparated, Relation::kTouching, Relation::kOverlapping}) {
@@ -221,7 +221,7 @@ TEST(RandomRelation, GenericHullsMatchTheOracle) {
     };
     const Pose X_WA = pose();
     const Pose X_WB = pose();
-    ASSERT_TRUE(check.Ask(a, X_WA, b, X_WB, OracleRelation(a, X_WA, b, X_WB)))
+    ASSERT_TRUE(check.Verify(a, X_WA, b, X_WB, OracleRelation(a, X_WA, b, X_WB)))
         << "seed " << seed << " round " << round;
   }
   EXPECT_GT(check.count(Rung::kFloatingPoint), check.queries());

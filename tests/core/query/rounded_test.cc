@@ -35,15 +35,15 @@ Relation RelationOf(const RoundedShape& a, const RoundedShape& b) {
 // Expects that the shapes touch, and that the next doubles of a radius decide otherwise.
 void ExpectTouch(RoundedCheck& check, RoundedShape a, const RoundedShape& b) {
   ASSERT_EQ(RelationOf(a, b), Relation::kTouching);
-  ASSERT_TRUE(check.Ask(a, b));
+  ASSERT_TRUE(check.Verify(a, b));
   const double radius = a.radius;
   a.radius = std::nextafter(radius, kInfinity);
   EXPECT_EQ(RelationOf(a, b), Relation::kOverlapping);
-  EXPECT_TRUE(check.Ask(a, b));
+  EXPECT_TRUE(check.Verify(a, b));
   if (radius == 0) return;
   a.radius = std::nextafter(radius, 0);
   EXPECT_EQ(RelationOf(a, b), Relation::kSeparated);
-  EXPECT_TRUE(check.Ask(a, b));
+  EXPECT_TRUE(check.Verify(a, b));
 }
 
 struct Step {
@@ -114,7 +114,7 @@ TEST(Rounded, IrrationalDistancesLieBetweenDoubles) {
     int separated = 0;
     for (const double radius : {std::nextafter(near, 0), near, std::nextafter(near, kInfinity)}) {
       const RoundedShape a = Sphere(radius, Vector::Zero());
-      ASSERT_TRUE(check.Ask(a, Sphere(0, offset)));
+      ASSERT_TRUE(check.Verify(a, Sphere(0, offset)));
       separated += RelationOf(a, Sphere(0, offset)) == Relation::kSeparated ? 1 : 0;
     }
     EXPECT_GE(separated, 1);
@@ -129,8 +129,8 @@ TEST(Rounded, TheSumOfTheRadiiIsExact) {
   const Vector one(1, 0, 0);
   for (const double rest : {0x1p-53, 0x1p-60, 0x1p-1074}) {
     EXPECT_EQ(RelationOf(Sphere(1, {0, 0, 0}), Sphere(rest, one)), Relation::kOverlapping);
-    EXPECT_TRUE(check.Ask(Sphere(1, {0, 0, 0}), Sphere(rest, one)));
-    EXPECT_TRUE(check.Ask(Sphere(1 - 0x1p-53, {0, 0, 0}), Sphere(rest, one)));
+    EXPECT_TRUE(check.Verify(Sphere(1, {0, 0, 0}), Sphere(rest, one)));
+    EXPECT_TRUE(check.Verify(Sphere(1 - 0x1p-53, {0, 0, 0}), Sphere(rest, one)));
   }
   EXPECT_EQ(RelationOf(Sphere(1 - 0x1p-53, {0, 0, 0}), Sphere(0x1p-53, one)), Relation::kTouching);
   EXPECT_EQ(RelationOf(Sphere(1 - 0x1p-53, {0, 0, 0}), Sphere(0x1p-54, one)), Relation::kSeparated);
@@ -170,7 +170,7 @@ TEST(Rounded, RandomLatticeShapesMatchBruteForce) {
     const double unit = std::array{1.0, 0.5, 0x1p-40, 0.1}[random.Below(4)];
     a.radius = unit * random.Between(1, 4);
     b.radius = unit * random.Between(0, 4);
-    ASSERT_TRUE(check.Ask(a, b)) << "seed " << seed << " round " << round;
+    ASSERT_TRUE(check.Verify(a, b)) << "seed " << seed << " round " << round;
   }
   EXPECT_GT(check.count(Relation::kSeparated), 100);
   EXPECT_GT(check.count(Relation::kTouching), 1);
@@ -187,13 +187,13 @@ TEST(Rounded, ExtremesOfScaleMatchBruteForce) {
   const double least = std::numeric_limits<double>::denorm_min();
   const double largest = std::numeric_limits<double>::max();
   const Points cube = LatticeCube(2, 1);
-  EXPECT_TRUE(check.Ask(Sphere(least, {0, 0, 0}), Sphere(0, {least, 0, 0})));
-  EXPECT_TRUE(check.Ask(Sphere(least, {0, 0, 0}), Sphere(least, {least, least, 0})));
-  EXPECT_TRUE(check.Ask(Shape(cube, least), Shape(cube, 0, {1, 0, 0})));
-  EXPECT_TRUE(check.Ask(Shape(cube, least), Shape(cube, 0, {0.5, 0.25, 0})));
-  EXPECT_TRUE(check.Ask(Shape(cube, 1e300), Shape(cube, 1, {3, 4, 5})));
-  EXPECT_TRUE(check.Ask(Shape(cube, 1e-300), Shape(cube, 1e-300, {1 + 0x1p-52, 0, 0})));
-  EXPECT_TRUE(check.Ask(Sphere(0x1p1000, {0, 0, 0}), Sphere(0, {3 * 0x1p1000, 0, 0})));
+  EXPECT_TRUE(check.Verify(Sphere(least, {0, 0, 0}), Sphere(0, {least, 0, 0})));
+  EXPECT_TRUE(check.Verify(Sphere(least, {0, 0, 0}), Sphere(least, {least, least, 0})));
+  EXPECT_TRUE(check.Verify(Shape(cube, least), Shape(cube, 0, {1, 0, 0})));
+  EXPECT_TRUE(check.Verify(Shape(cube, least), Shape(cube, 0, {0.5, 0.25, 0})));
+  EXPECT_TRUE(check.Verify(Shape(cube, 1e300), Shape(cube, 1, {3, 4, 5})));
+  EXPECT_TRUE(check.Verify(Shape(cube, 1e-300), Shape(cube, 1e-300, {1 + 0x1p-52, 0, 0})));
+  EXPECT_TRUE(check.Verify(Sphere(0x1p1000, {0, 0, 0}), Sphere(0, {3 * 0x1p1000, 0, 0})));
   // The sum of the radii exceeds every double.
   const RoundedShape huge = Sphere(largest, {0, 0, 0});
   EXPECT_EQ(RelationOf(huge, huge), Relation::kOverlapping);
@@ -208,7 +208,7 @@ TEST(Rounded, DeepOverlapsOfCoresAddTheirDepthToTheRadii) {
   RoundedCheck check;
   const Points cube = LatticeCube(2, 4);
   for (const Vector& t : {Vector(2, 1, 1), Vector(0, 0, 0), Vector(3.5, 0.5, 0.25)}) {
-    EXPECT_TRUE(check.Ask(Shape(cube, 0x1p-30), Shape(cube, 0.25, t)));
+    EXPECT_TRUE(check.Verify(Shape(cube, 0x1p-30), Shape(cube, 0.25, t)));
   }
   QueryOptions options;
   options.want_separation = options.want_normal = true;

@@ -40,8 +40,8 @@ Pose RandomPose(Random& random, double reach) {
   return pose;
 }
 
-Answer Ask(const Hull& a, const Pose& X_WA, const Hull& b, const Pose& X_WB,
-           std::optional<double> max_error = std::nullopt) {
+Answer Query(const Hull& a, const Pose& X_WA, const Hull& b, const Pose& X_WB,
+             std::optional<double> max_error = std::nullopt) {
   return CheckCollision(a, X_WA, b, X_WB, WantSeparation(max_error)).value();
 }
 
@@ -56,13 +56,13 @@ TEST(Separation, CubesHaveTheExpectedLengths) {
                 {At(1, 1, 1), 0},           {At(0, 0, 0), -1},
                 {At(0.75, 0.25, 0), -0.25}, {At(0.5, 0.5, 0.875), -0.125}};
   for (const auto& [X_WB, separation] : kCases) {
-    const Answer exact = Ask(cube, Pose(), cube, X_WB, 0);
+    const Answer exact = Query(cube, Pose(), cube, X_WB, 0);
     EXPECT_EQ(exact.separation->value, separation);
     EXPECT_LE(exact.separation->bound, 0x1p-51 * std::abs(separation));
-    const Answer answer = Ask(cube, Pose(), cube, X_WB);
+    const Answer answer = Query(cube, Pose(), cube, X_WB);
     EXPECT_NEAR(answer.separation->value, separation, 1e-11);
-    EXPECT_TRUE(check.Ask(cube, Pose(), cube, X_WB));
-    EXPECT_TRUE(check.Ask(cube, Pose(), cube, X_WB, 0));
+    EXPECT_TRUE(check.Verify(cube, Pose(), cube, X_WB));
+    EXPECT_TRUE(check.Verify(cube, Pose(), cube, X_WB, 0));
   }
 }
 
@@ -79,14 +79,14 @@ TEST(Separation, EmptyHullsAreInfinitelyFar) {
 TEST(Separation, OutOfRangeValuesSaturate) {
   const Hull far_left = BuildHull(std::vector<Vector>{{-kLargest, 0, 0}, {-kLargest, 1, 0}});
   const Hull far_right = BuildHull(std::vector<Vector>{{kLargest, 0, 0}});
-  const Answer far = Ask(far_left, Pose(), far_right, Pose());
+  const Answer far = Query(far_left, Pose(), far_right, Pose());
   EXPECT_EQ(far.separation->value, kLargest);
   EXPECT_EQ(far.separation->bound, kInfinity);
   const Hull slab = BuildHull(std::vector<Vector>{{-kLargest, -kLargest, -kLargest},
                                                   {kLargest, -kLargest, -kLargest},
                                                   {0, kLargest, -kLargest},
                                                   {0, 0, kLargest}});
-  const Answer deep = Ask(slab, Pose(), slab, Pose());
+  const Answer deep = Query(slab, Pose(), slab, Pose());
   EXPECT_EQ(deep.relation, Relation::kOverlapping);
   EXPECT_LT(deep.separation->value, -1e308);
   EXPECT_GT(deep.separation->bound, 0);
@@ -94,13 +94,13 @@ TEST(Separation, OutOfRangeValuesSaturate) {
 
 TEST(Separation, TheSmallestDoubleKeepsItsSign) {
   const Hull point = BuildHull(std::vector<Vector>{{0, 0, 0}});
-  const Answer near = Ask(point, Pose(), point, At(kLeast, 0, 0));
+  const Answer near = Query(point, Pose(), point, At(kLeast, 0, 0));
   EXPECT_EQ(near.separation->value, kLeast);
   // Rotated, it is a third of that along each axis; a length that no double represents.
   const Hull needle = BuildHull(std::vector<Vector>{{0, 0, 0}, {1, 1, 1}});
   Pose turned;
   turned.q = {1, 0.3, 0.2, 0.1};
-  const Answer tiny = Ask(needle, turned, point, At(kLeast, 0, 0), 0);
+  const Answer tiny = Query(needle, turned, point, At(kLeast, 0, 0), 0);
   EXPECT_EQ(tiny.relation, Relation::kSeparated);
   EXPECT_EQ(tiny.separation->value, kLeast);
   EXPECT_GT(tiny.separation->bound, 0);
@@ -132,7 +132,7 @@ TEST(Separation, SmallHullsOfEveryDimensionMatchBruteForce) {
     const Hull b = BuildHull(Scaled(second, scale));
     std::optional<double> max_error;
     if (random.Below(3) == 0) max_error = random.Below(2) ? 0 : 1e-3 * scale;
-    ASSERT_TRUE(check.Ask(a, X_WA, b, X_WB, max_error)) << "seed " << seed << " round " << round;
+    ASSERT_TRUE(check.Verify(a, X_WA, b, X_WB, max_error)) << "seed " << seed << " round " << round;
   }
   for (const Relation r : {Relation::kSeparated, Relation::kTouching, Relation::kOverlapping}) {
     EXPECT_GT(check.count(r), kRounds / 40) << Name(r);
@@ -161,7 +161,7 @@ TEST(Separation, NeedlesPlatesAndOffsetsMatchBruteForce) {
     const Vector offset = Vector::Constant(std::array{0.0, 1e6, 1e15}[random.Below(3)]);
     X_WA.t += offset;
     X_WB.t += offset;
-    ASSERT_TRUE(check.Ask(BuildHull(points()), X_WA, BuildHull(points()), X_WB))
+    ASSERT_TRUE(check.Verify(BuildHull(points()), X_WA, BuildHull(points()), X_WB))
         << "seed " << seed << " round " << round;
   }
   EXPECT_GT(check.count(Relation::kSeparated), kRounds / 40);
@@ -190,8 +190,8 @@ TEST(Separation, FloatingPointAgreesWithExactArithmeticOnLargerHulls) {
     const Hull b = BuildHull(RandomInBall(random, n, 1));
     const Pose X_WA = RandomPose(random, 0.1);
     const Pose X_WB = RandomPose(random, random.Below(2) ? 0.9 : 4);
-    const Answer rough = Ask(a, X_WA, b, X_WB);
-    const Answer exact = Ask(a, X_WA, b, X_WB, 0);
+    const Answer rough = Query(a, X_WA, b, X_WB);
+    const Answer exact = Query(a, X_WA, b, X_WB, 0);
     EXPECT_TRUE(Agree(*rough.separation, *exact.separation))
         << "seed " << seed << " round " << round;
     EXPECT_LE(rough.separation->bound, 1e-12 * (4 + std::abs(rough.separation->value)));
@@ -245,12 +245,12 @@ TEST(Separation, AContactPointNeedsExactArithmeticOnlyIfItsErrorMustBeLeast) {
         Pose X_WB = X_WA;
         // A rotation by 2 atan(2) about x, exactly.
         X_WB.t += Vector(t.x(), -0.6 * t.y() - 0.8 * t.z(), 0.8 * t.y() - 0.6 * t.z());
-        EXPECT_TRUE(check.Ask(cube, X_WA, *b, X_WB));
+        EXPECT_TRUE(check.Verify(cube, X_WA, *b, X_WB));
         const Pose unrotated = At(far.x() + t.x(), far.y() + t.y(), far.z() + t.z());
         const Pose origin = At(far.x(), far.y(), far.z());
-        EXPECT_TRUE(check.Ask(cube, origin, *b, unrotated));
-        const Answer answer = Ask(cube, origin, *b, unrotated);
-        const Answer exact = Ask(cube, origin, *b, unrotated, 0);
+        EXPECT_TRUE(check.Verify(cube, origin, *b, unrotated));
+        const Answer answer = Query(cube, origin, *b, unrotated);
+        const Answer exact = Query(cube, origin, *b, unrotated, 0);
         ASSERT_EQ(answer.relation, Relation::kTouching);
         EXPECT_EQ(answer.witness->p_WA, answer.witness->p_WB);
         EXPECT_GT(answer.witness->error, exact.witness->error);
@@ -265,7 +265,7 @@ TEST(Separation, TheTextbookMethodReturnsTheSame) {
   QueryOptions textbook = WantSeparation();
   textbook.method = Method::kTextbookSat;
   for (const double x : {0.3, 1.0, 1.7}) {
-    const Answer expected = Ask(cube, Pose(), cube, At(x, 0.1, 0));
+    const Answer expected = Query(cube, Pose(), cube, At(x, 0.1, 0));
     const Answer answer = CheckCollision(cube, Pose(), cube, At(x, 0.1, 0), textbook).value();
     EXPECT_EQ(answer.separation->value, expected.separation->value);
     EXPECT_EQ(answer.witness->p_WB, expected.witness->p_WB);
@@ -324,7 +324,7 @@ class PiercedDisc : public testing::Test {
     return BuildHull(points);
   }
 
-  absl::StatusOr<Answer> Ask(const QueryOptions& options) const {
+  absl::StatusOr<Answer> Query(const QueryOptions& options) const {
     return CheckCollision(disc_, Pose(), needle_, Pose(), options);
   }
 
@@ -337,7 +337,7 @@ TEST_F(PiercedDisc, TheSearchForItsDepthPollsOften) {
   uint64_t most = UINT64_MAX;
   QueryOptions options = WantSeparation(0);
   options.should_stop = [&] { return ++polls >= most; };
-  const absl::StatusOr<Answer> answer = Ask(options);
+  const absl::StatusOr<Answer> answer = Query(options);
   ASSERT_TRUE(answer.ok()) << answer.status();
   EXPECT_NEAR(answer->separation->value, -1, 1e-5);
   // The exact search polls at each corner, and so often that a stop may come anywhere in it.
@@ -345,7 +345,7 @@ TEST_F(PiercedDisc, TheSearchForItsDepthPollsOften) {
   const uint64_t all = polls;
   for (most = 1; most < all; most *= 2) {
     polls = 0;
-    EXPECT_TRUE(absl::IsCancelled(Ask(options).status()));
+    EXPECT_TRUE(absl::IsCancelled(Query(options).status()));
     EXPECT_EQ(polls, most);
   }
 }
@@ -353,15 +353,15 @@ TEST_F(PiercedDisc, TheSearchForItsDepthPollsOften) {
 TEST_F(PiercedDisc, TheSearchForItsDepthStaysWithinItsMemoryLimit) {
   QueryOptions options = WantSeparation(0);
   options.max_depth_bytes = 100 << 20;
-  EXPECT_TRUE(Ask(options).ok());
+  EXPECT_TRUE(Query(options).ok());
   options.max_depth_bytes = 1 << 20;
-  const absl::Status refused = Ask(options).status();
+  const absl::Status refused = Query(options).status();
   EXPECT_TRUE(absl::IsResourceExhausted(refused));
   EXPECT_TRUE(IsDepthTooLarge(refused));
   EXPECT_NE(refused.message().find("more than 1048576 bytes"), std::string::npos) << refused;
   // Floating point needs little.
   options.max_error = 1e-6;
-  EXPECT_TRUE(Ask(options).ok());
+  EXPECT_TRUE(Query(options).ok());
 }
 
 }  // namespace separation_test

@@ -32,8 +32,8 @@ void Expect(const Hull& a, const Pose& X_WA, const Hull& b, const Pose& X_WB, Re
             const char* scene) {
   const bool small = std::max(a.vertices().size(), b.vertices().size()) <= kTextbookVertices;
   RelationCheck check;
-  EXPECT_TRUE(check.Ask(a, X_WA, b, X_WB, expected,
-                        small ? RelationCheck::kAllWays : RelationCheck::kSearchOnly))
+  EXPECT_TRUE(check.Verify(a, X_WA, b, X_WB, expected,
+                           small ? RelationCheck::kAllWays : RelationCheck::kSearchOnly))
       << scene;
 #ifndef HULLD_SANITIZED
   EXPECT_STREQ(Name(OracleRelation(a, X_WA, b, X_WB)), Name(expected)) << scene;

@@ -16,7 +16,7 @@ Pose At(double x, double y, double z) {
   return pose;
 }
 
-Answer Ask(const Hull& a, const Hull& b, const Pose& X_WB, double tolerance) {
+Answer Query(const Hull& a, const Hull& b, const Pose& X_WB, double tolerance) {
   QueryOptions options;
   options.tolerance = tolerance;
   return CheckCollision(a, Pose(), b, X_WB, options).value();
@@ -33,8 +33,8 @@ TEST(Tolerance, IsUsedOnlyWhereTheSeparationIsWithinIt) {
       const double offset = 1 + gap;
       const double separation = offset - 1;
       for (const Pose& X : {At(offset, 0, 0), At(0, -offset, 0), At(offset, 0.25, 0.125)}) {
-        const Relation exact = Ask(cube, cube, X, 0).relation;
-        const Relation relation = Ask(cube, cube, X, tolerance).relation;
+        const Relation exact = Query(cube, cube, X, 0).relation;
+        const Relation relation = Query(cube, cube, X, tolerance).relation;
         ++seen[static_cast<size_t>(relation)];
         if (relation != Relation::kWithinTolerance) {
           EXPECT_EQ(relation, exact) << gap;
@@ -65,9 +65,9 @@ TEST(Tolerance, AvoidsExactArithmeticInContact) {
       }
     }
     const Hull plate = BuildHull(corners);
-    ASSERT_EQ(Ask(ball, plate, Pose(), 0).relation, Relation::kTouching);
-    ASSERT_EQ(Ask(ball, plate, Pose(), 0).rung, Rung::kExact);
-    const Answer answer = Ask(ball, plate, Pose(), 1e-6);
+    ASSERT_EQ(Query(ball, plate, Pose(), 0).relation, Relation::kTouching);
+    ASSERT_EQ(Query(ball, plate, Pose(), 0).rung, Rung::kExact);
+    const Answer answer = Query(ball, plate, Pose(), 1e-6);
     EXPECT_TRUE(answer.relation == Relation::kWithinTolerance ||
                 answer.relation == Relation::kTouching);
     spared += answer.rung == Rung::kFloatingPoint;
@@ -89,7 +89,7 @@ TEST(Tolerance, IsNeverClaimedBeyondTheTolerance) {
     const double tolerance = random.Real(0.01, 0.5);
     Pose X;
     X.t = distance * u;
-    if (Ask(a, b, X, tolerance).relation != Relation::kWithinTolerance) continue;
+    if (Query(a, b, X, tolerance).relation != Relation::kWithinTolerance) continue;
     ++within;
     // B grown by a cube that contains the ball of radius `tolerance` (1 + 1e-9) touches or overlaps
     // A.
@@ -100,7 +100,7 @@ TEST(Tolerance, IsNeverClaimedBeyondTheTolerance) {
         grown.push_back(v + Vector(corner & 1 ? r : -r, corner & 2 ? r : -r, corner & 4 ? r : -r));
       }
     }
-    EXPECT_NE(Ask(a, BuildHull(grown), X, 0).relation, Relation::kSeparated) << "round " << round;
+    EXPECT_NE(Query(a, BuildHull(grown), X, 0).relation, Relation::kSeparated) << "round " << round;
   }
   EXPECT_GT(within, 100);
 }

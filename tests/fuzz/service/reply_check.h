@@ -36,7 +36,7 @@ std::string CheckScene(const v1::FindCollisionsRequest& request,
 
 // Returns true if a scene includes this pair. Scene: FindCollisionsRequest, or its watch.
 template <typename Scene>
-bool AsksAbout(const Scene& scene, int a, int b) {
+bool Selects(const Scene& scene, int a, int b) {
   if (scene.has_movers() && static_cast<uint32_t>(a) >= scene.movers()) return false;
   if (scene.groups().empty()) return true;
   const uint32_t g = scene.groups(a);

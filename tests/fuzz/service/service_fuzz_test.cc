@@ -87,7 +87,7 @@ constexpr Goal kGoals[] = {
     {"body compared RELATION_SEPARATED", 10},
     {"body compared RELATION_TOUCHING", 10},
     {"body compared RELATION_OVERLAPPING", 10},
-    {"WatchHulls told", 20},
+    {"WatchHulls reported", 20},
     {"WatchHulls change", 2},
     {"WatchHulls resumed", 10},
     {"WatchHulls INVALID_ARGUMENT", 20},

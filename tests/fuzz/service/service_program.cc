@@ -102,7 +102,7 @@ void ServiceProgram::Step() {
     case 24:
       return PutBody();
     case 25:
-      return AskAboutBody();
+      return QueryBody();
     case 26:
       return in_.OneOf(2) ? GetBody() : in_.OneOf(2) ? DeleteBody() : ListBodies();
     default:
@@ -324,7 +324,7 @@ void ServiceProgram::ReplaceHull() {
   v1::ReplaceHullResponse response;
   const auto stream = service_.hulls_->ReplaceHull(&context, &response);
   const size_t messages = in_.Below(5);
-  const bool says_all = !in_.OneOf(4);
+  const bool half_closes = !in_.OneOf(4);
   const size_t cancel_at = in_.OneOf(12) ? in_.Below(5) : ~size_t{0};
   ReplaceCheck check;
   bool going = true;
@@ -339,7 +339,7 @@ void ServiceProgram::ReplaceHull() {
     }
     send(NextReplaceMessage(i == 0));
   }
-  if (says_all) {
+  if (half_closes) {
     v1::ReplaceHullRequest end;
     end.mutable_points();
     send(end);
@@ -447,11 +447,11 @@ std::vector<double> ServiceProgram::VerticesOf(const std::string& hull_id) {
 }
 
 // Queries the same pair again for a proof of its relation.
-void ServiceProgram::CheckCertificateOf(const v1::CheckCollisionRequest& asked,
+void ServiceProgram::CheckCertificateOf(const v1::CheckCollisionRequest& query,
                                         const v1::CheckCollisionResponse& answer) {
   v1::CheckCollisionRequest request;
-  *request.mutable_a() = asked.a();
-  *request.mutable_b() = asked.b();
+  *request.mutable_a() = query.a();
+  *request.mutable_b() = query.b();
   request.mutable_wanted()->set_certificate(true);
   grpc::ClientContext context;
   v1::CheckCollisionResponse response;
@@ -459,9 +459,9 @@ void ServiceProgram::CheckCertificateOf(const v1::CheckCollisionRequest& asked,
   if (!status.ok()) return Note("no certificate: " + status.error_message());
   // A body has taken over the ID of a deleted hull.
   if (!response.piece_hulls().empty()) return;
-  if (asked.a().has_points() || asked.b().has_points()) return;
+  if (query.a().has_points() || query.b().has_points()) return;
   // The certificate of a motion applies at the time of contact.
-  if (asked.a().has_end_pose() || asked.b().has_end_pose()) return;
+  if (query.a().has_end_pose() || query.b().has_end_pose()) return;
   if (answer.relation() != v1::RELATION_WITHIN_TOLERANCE &&
       answer.relation() != response.relation()) {
     return Note(
@@ -478,7 +478,7 @@ void ServiceProgram::CheckCertificateOf(const v1::CheckCollisionRequest& asked,
     if (!checked.ok()) Note("the certificate is wrong: " + checked.ToString());
   };
   check(response);
-  if (asked.wanted().certificate()) check(answer);
+  if (query.wanted().certificate()) check(answer);
   Reach("certificate");
 }
 
@@ -496,12 +496,13 @@ void ServiceProgram::BatchCheckCollisions() {
   if (request.pairs_size() > 0) Reach("BatchCheckCollisions with pairs");
   if (!packed.has_value() || request.tolerance() != 0 || !finding_.empty()) return;
   Reach("BatchCheckCollisions compared with packed placements");
-  if (AskBatch(request) != RelationsOf(parts) && finding_.empty()) {
+  if (QueryBatch(request) != RelationsOf(parts) && finding_.empty()) {
     Note("packed placements are answered differently");
   }
 }
 
-std::vector<v1::Relation> ServiceProgram::AskBatch(const v1::BatchCheckCollisionsRequest& request) {
+std::vector<v1::Relation> ServiceProgram::QueryBatch(
+    const v1::BatchCheckCollisionsRequest& request) {
   grpc::ClientContext context;
   const auto reader = service_.collisions_->BatchCheckCollisions(&context, request);
   std::vector<v1::BatchCheckCollisionsResponse> parts;
@@ -561,7 +562,7 @@ void ServiceProgram::StreamCollisions() {
   if (!Ended(Rpc::kStreamCollisions, manner, stream->Finish()) || !finding_.empty()) return;
   if (messages == 0 || check.relations().empty() || check.has_tolerance()) return;
   Reach(messages > 1 ? "StreamCollisions compared after updates" : "StreamCollisions compared");
-  if (AskBatch(check.AsBatch()) != check.relations() && finding_.empty()) {
+  if (QueryBatch(check.AsBatch()) != check.relations() && finding_.empty()) {
     Note("a stream and a batch disagree");
   }
 }
@@ -589,12 +590,12 @@ void ServiceProgram::CompareSceneWithBatch(const v1::FindCollisionsRequest& requ
   *batch.mutable_placements() = request.placements();
   for (int b = 0; b < request.placements_size(); ++b) {
     for (int a = 0; a < b; ++a) {
-      if (!AsksAbout(request, a, b)) continue;
+      if (!Selects(request, a, b)) continue;
       batch.add_pairs(static_cast<uint32_t>(a));
       batch.add_pairs(static_cast<uint32_t>(b));
     }
   }
-  const std::vector<v1::Relation> relations = AskBatch(batch);
+  const std::vector<v1::Relation> relations = QueryBatch(batch);
   std::set<std::pair<uint32_t, uint32_t>> expected;
   for (size_t i = 0; i < relations.size(); ++i) {
     const int at = static_cast<int>(2 * i);

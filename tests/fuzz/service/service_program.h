@@ -67,7 +67,7 @@ class ServiceProgram {
   void GetBody();
   void ListBodies();
   void DeleteBody();
-  void AskAboutBody();
+  void QueryBody();
   void SendRaw();
 
   MessageHints Hints() const { return {revision_, 1, 0, service_.store_id_}; }
@@ -115,9 +115,9 @@ class ServiceProgram {
 
   // Calls besides the program's own, which must end OK.
   std::vector<double> VerticesOf(const std::string& hull_id);
-  void CheckCertificateOf(const v1::CheckCollisionRequest& asked,
+  void CheckCertificateOf(const v1::CheckCollisionRequest& query,
                           const v1::CheckCollisionResponse& answer);
-  std::vector<v1::Relation> AskBatch(const v1::BatchCheckCollisionsRequest& request);
+  std::vector<v1::Relation> QueryBatch(const v1::BatchCheckCollisionsRequest& request);
   void CompareSceneWithBatch(const v1::FindCollisionsRequest& request,
                              std::span<const v1::FindCollisionsResponse> parts);
 

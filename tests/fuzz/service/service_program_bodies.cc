@@ -54,7 +54,7 @@ void ServiceProgram::PutBody() {
     Note("a put returns a different body: " + body.ShortDebugString());
   }
   bodies_[request.body_id()] = request;
-  AskAboutBody();
+  QueryBody();
   if (in_.OneOf(4)) GetBody();
   if (in_.OneOf(4)) DeleteBody();
 }
@@ -122,7 +122,7 @@ void ServiceProgram::DeleteBody() {
 
 // Queries a body at the identity pose, so that its pieces can be queried at the same places:
 // against any placement, or another such body.
-void ServiceProgram::AskAboutBody() {
+void ServiceProgram::QueryBody() {
   if (bodies_.empty()) return;
   const auto any_body = [this] {
     return std::next(bodies_.begin(), static_cast<ptrdiff_t>(in_.Below(bodies_.size())))->first;
@@ -184,7 +184,7 @@ void ServiceProgram::CompareWithPieces(const v1::CheckCollisionRequest& request,
     }
   }
   v1::Relation strongest = v1::RELATION_SEPARATED;
-  for (const v1::Relation relation : AskBatch(batch)) {
+  for (const v1::Relation relation : QueryBatch(batch)) {
     if (Strength(relation) > Strength(strongest)) strongest = relation;
     if (relation == v1::RELATION_UNSPECIFIED)
       Note("a body has an answer, but one of its pieces has none");

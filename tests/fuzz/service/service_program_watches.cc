@@ -46,8 +46,8 @@ bool ServiceProgram::WatchHullsOnce(const v1::WatchHullsRequest& request, bool t
   const auto reader = service_.hulls_->WatchHulls(&context, request);
   bool lasts = true;
   v1::WatchHullsResponse response;
-  const auto read_until = [&](const auto& is_told) {
-    while (finding_.empty() && !is_told()) {
+  const auto read_until = [&](const auto& is_done) {
+    while (finding_.empty() && !is_done()) {
       lasts = reader->Read(&response);
       if (!lasts) return false;
       SeeStore(response.header());
@@ -55,11 +55,11 @@ bool ServiceProgram::WatchHullsOnce(const v1::WatchHullsRequest& request, bool t
     }
     return finding_.empty();
   };
-  bool told = read_until([&] { return check->is_synced(); });
+  bool reported = read_until([&] { return check->is_synced(); });
   // A resumed watch reports the changes only.
-  const bool tells_all = !Resumes(request) || check->is_restarted();
-  if (told && tells_all) CompareWatched(*check);
-  if (told && then_change) {
+  const bool lists_all = !Resumes(request) || check->is_restarted();
+  if (reported && lists_all) CompareWatched(*check);
+  if (reported && then_change) {
     const auto before = hulls_;
     watch_ = &context;
     if (in_.OneOf(2)) {
@@ -71,8 +71,9 @@ bool ServiceProgram::WatchHullsOnce(const v1::WatchHullsRequest& request, bool t
     }
     // null: another call was abandoned, and this watch with it.
     manner.cancelled = std::exchange(watch_, nullptr) == nullptr;
-    told = !manner.cancelled && doubtful_.empty() && !all_doubtful_;
-    for (const std::string& changed : told ? ChangedSince(before) : std::vector<std::string>()) {
+    reported = !manner.cancelled && doubtful_.empty() && !all_doubtful_;
+    for (const std::string& changed :
+         reported ? ChangedSince(before) : std::vector<std::string>()) {
       if (!check->Watches(changed)) continue;
       Reach("WatchHulls change");
       const auto seen = [&] {
@@ -81,9 +82,9 @@ bool ServiceProgram::WatchHullsOnce(const v1::WatchHullsRequest& request, bool t
         if (now == hulls_.end()) return known == check->hulls().end();
         return known != check->hulls().end() && known->second.revision() == now->second.revision();
       };
-      told = told && read_until(seen);
+      reported = reported && read_until(seen);
     }
-    if (told && tells_all) CompareWatched(*check);
+    if (reported && lists_all) CompareWatched(*check);
   }
   manner.cancelled = manner.cancelled || lasts;
   // A watch that has ended returns its status.
@@ -92,8 +93,8 @@ bool ServiceProgram::WatchHullsOnce(const v1::WatchHullsRequest& request, bool t
   }
   const grpc::Status status = reader->Finish();
   Ended(Rpc::kWatchHulls, manner, status);
-  if (told) Reach("WatchHulls told");
-  return told;
+  if (reported) Reach("WatchHulls reported");
+  return reported;
 }
 
 // Returns the hulls with a revision other than in `before`, created and deleted ones included.
@@ -122,10 +123,11 @@ void ServiceProgram::CompareWatched(const HullWatchCheck& check) {
   }
   const uint64_t revision = revision_;
   // Points that change no vertex are reported with the next event.
-  for (const auto& [hull_id, told] : check.hulls()) {
+  for (const auto& [hull_id, reported] : check.hulls()) {
     const auto known = hulls_.find(hull_id);
-    const bool only_counted = known != hulls_.end() && known->second.revision() == told.revision();
-    if (!only_counted) SeeKnownHull(told);
+    const bool only_counted =
+        known != hulls_.end() && known->second.revision() == reported.revision();
+    if (!only_counted) SeeKnownHull(reported);
   }
   revision_ = revision;
 }
@@ -199,7 +201,7 @@ void ServiceProgram::WatchCollisions() {
 void ServiceProgram::CompareWatchWithBatch(const CollisionWatchCheck& check) {
   const v1::BatchCheckCollisionsRequest batch = check.AsBatch();
   if (batch.pairs_size() > kMaxComparedPairsOfWatch) return;
-  const std::vector<v1::Relation> relations = AskBatch(batch);
+  const std::vector<v1::Relation> relations = QueryBatch(batch);
   std::map<std::pair<uint32_t, uint32_t>, v1::Relation> expected;
   for (size_t i = 0; i < relations.size(); ++i) {
     const int at = static_cast<int>(2 * i);

@@ -123,7 +123,7 @@ void CollisionWatchCheck::Sent(const v1::CollisionWatchUpdate& update) {
 bool CollisionWatchCheck::IsWatched(const Pair& pair) const {
   if (!named_.empty()) return named_.count(pair) > 0;
   return pair.first < pair.second && pair.second < static_cast<uint32_t>(open_.placements_size()) &&
-         AsksAbout(open_, static_cast<int>(pair.first), static_cast<int>(pair.second));
+         Selects(open_, static_cast<int>(pair.first), static_cast<int>(pair.second));
 }
 
 std::string CollisionWatchCheck::Received(const v1::WatchCollisionsResponse& response) {
@@ -151,7 +151,7 @@ std::string CollisionWatchCheck::Received(const v1::WatchCollisionsResponse& res
     }
   }
   is_synced_ = response.synced();
-  if (is_synced_) told_now_.clear();
+  if (is_synced_) reported_now_.clear();
   return {};
 }
 
@@ -198,13 +198,13 @@ std::string CollisionWatchCheck::TakeEvent(const v1::CollisionEvent& event) {
     }
     if (!finding.empty()) return finding;
   }
-  State& state = told_[pair];
+  State& state = reported_[pair];
   const State before = state;
   state = {event.relation(), event.within_clearance()};
   // A pair named twice is reported twice.
   const auto named = named_.find(pair);
   if (named != named_.end() && named->second > 1) return {};
-  if (!told_now_.insert(pair).second) return "it is reported twice";
+  if (!reported_now_.insert(pair).second) return "it is reported twice";
   const v1::CollisionEventKind kind =
       KindOf(before.relation, before.is_near, state.relation, state.is_near);
   if (event.kind() == kind) return {};
@@ -215,7 +215,7 @@ std::string CollisionWatchCheck::TakeEvent(const v1::CollisionEvent& event) {
 
 std::map<std::pair<uint32_t, uint32_t>, v1::Relation> CollisionWatchCheck::Colliding() const {
   std::map<Pair, v1::Relation> colliding;
-  for (const auto& [pair, state] : told_) {
+  for (const auto& [pair, state] : reported_) {
     if (!IsCollision(state.relation)) continue;
     colliding[std::minmax(pair.first, pair.second)] = state.relation;
   }

@@ -78,11 +78,11 @@ class CollisionWatchCheck {
   v1::CollisionWatchOpen open_;
   // For explicitly named pairs: their multiplicity.
   std::map<Pair, int> named_;
-  std::map<Pair, State> told_;
+  std::map<Pair, State> reported_;
   // Last version sent, by ID.
   std::map<std::string, Version> versions_;
   // Since the last `synced`.
-  std::set<Pair> told_now_;
+  std::set<Pair> reported_now_;
   uint64_t sent_ = 0;
   uint64_t reported_update_ = 0;
   uint64_t revision_ = 0;

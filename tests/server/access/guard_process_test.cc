@@ -93,11 +93,11 @@ TEST_F(GuardProcess, ChangedFilesAreDetectedWithoutASignal) {
   const std::string address = AddressIn(hulld.ReadLineWith("listening on "));
   EXPECT_EQ(Call(address, kToken, authority_), grpc::StatusCode::OK);
   WriteTokens(Line(kWrongToken));
-  EXPECT_NE(hulld.ReadLineWith("1 token in force"), "");
+  EXPECT_NE(hulld.ReadLineWith("loaded 1 token"), "");
   EXPECT_EQ(Call(address, kToken, authority_), grpc::StatusCode::UNAUTHENTICATED);
   EXPECT_EQ(Call(address, kWrongToken, authority_), grpc::StatusCode::OK);
   WriteIdentity(other_.Issue("renewed"));
-  EXPECT_NE(hulld.ReadLineWith("TLS certificate of CN = renewed in force"), "");
+  EXPECT_NE(hulld.ReadLineWith("using the TLS certificate of CN = renewed"), "");
   EXPECT_EQ(Call(address, kWrongToken, other_), grpc::StatusCode::OK);
 }
 

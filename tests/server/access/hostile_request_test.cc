@@ -110,7 +110,7 @@ TEST_F(HostileRequest, AuthorizedCallersUseLittleMemory) {
 }
 
 // Regression test: gRPC's own reflection service used a thread per stream, without a token.
-TEST_F(HostileRequest, SilentReflectionStreamsTakeNoThreads) {
+TEST_F(HostileRequest, IdleReflectionStreamsOccupyNoThreads) {
   using grpc::reflection::v1alpha::ServerReflection;
   using grpc::reflection::v1alpha::ServerReflectionRequest;
   using grpc::reflection::v1alpha::ServerReflectionResponse;

@@ -49,10 +49,10 @@ class Tls : public ServerTest {
     arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
     const auto stub = v1::StatusService::NewStub(
         grpc::CreateCustomChannel(server_->address(), credentials, arguments));
-    return Ask(*stub);
+    return Call(*stub);
   }
 
-  static grpc::StatusCode Ask(v1::StatusService::Stub& stub) {
+  static grpc::StatusCode Call(v1::StatusService::Stub& stub) {
     grpc::ClientContext context;
     v1::GetStatusResponse response;
     return stub.GetStatus(&context, {}, &response).error_code();
@@ -132,14 +132,14 @@ TEST_F(Tls, NewConnectionsUseReplacedCertificatesAndOldOnesStay) {
   Restart(config_);
   const auto standing =
       v1::StatusService::NewStub(grpc::CreateChannel(server_->address(), Trusting(authority_)));
-  ASSERT_EQ(Ask(*standing), grpc::StatusCode::OK);
+  ASSERT_EQ(Call(*standing), grpc::StatusCode::OK);
   const TestIdentity renewed = other_.Issue("hulld");
   Write("server.crt", renewed.certificate);
   Write("server.key", renewed.key);
   server_->ReloadFiles();
   EXPECT_EQ(Connect(Trusting(other_)), grpc::StatusCode::OK);
   EXPECT_EQ(Connect(Trusting(authority_)), grpc::StatusCode::UNAVAILABLE);
-  EXPECT_EQ(Ask(*standing), grpc::StatusCode::OK);
+  EXPECT_EQ(Call(*standing), grpc::StatusCode::OK);
 }
 
 TEST_F(Tls, AnIncompleteReplacementIsIgnored) {
@@ -205,7 +205,7 @@ TEST_F(Tls, UnixSocketsWorkWithAndWithoutTls) {
   arguments.SetSslTargetNameOverride("localhost");
   const auto stub = v1::StatusService::NewStub(
       grpc::CreateCustomChannel(server_->address(), Trusting(authority_), arguments));
-  EXPECT_EQ(Ask(*stub), grpc::StatusCode::OK);
+  EXPECT_EQ(Call(*stub), grpc::StatusCode::OK);
 }
 
 TEST_F(Tls, ReachableAddressesNeedTls) {

@@ -45,8 +45,8 @@ TEST(TokenTable, ErrorsNameTheLineAndQuoteNoHash) {
     EXPECT_THAT(std::string(status.message()), Not(HasSubstr("ba7816bf"))) << text;
   };
   const std::string good = Line("a", "admin", "*", kAbc);
-  expect(good + "b admin *\n", "line 2: expected four words");
-  expect("# x\n" + Line("b", "admin", "* more", kAbc), "line 2: expected four words");
+  expect(good + "b admin *\n", "line 2: expected four fields");
+  expect("# x\n" + Line("b", "admin", "* more", kAbc), "line 2: expected four fields");
   expect(Line("-b", "admin", "*", kAbc), "line 1: the name");
   expect(Line(std::string(65, 'b'), "admin", "*", kAbc), "line 1: the name");
   expect(Line("b/c", "admin", "*", kAbc), "line 1: the name");

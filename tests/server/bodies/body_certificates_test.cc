@@ -206,7 +206,7 @@ class BodyProofs : public BodyCertificates {
     AnswerChecker checker(client);
     HullVersions versions;
     for (const v1::HullVersion& hull : piece_hulls) {
-      EXPECT_TRUE(versions.emplace(hull.hull_id(), &hull).second) << "told twice";
+      EXPECT_TRUE(versions.emplace(hull.hull_id(), &hull).second) << "reported twice";
     }
     EXPECT_EQ(static_cast<size_t>(columns.relations_size()), pairs.size() / 2);
     EXPECT_EQ(columns.certificates_size(), columns.relations_size());

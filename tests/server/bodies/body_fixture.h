@@ -47,8 +47,9 @@ class BodyTest : public ServerTest {
     ASSERT_TRUE(PutBody(body_id, {PlacementOf("cube"), PlacementOf("cube", 5, 0, 0)}).ok());
   }
 
-  absl::StatusOr<v1::CheckCollisionResponse> Ask(const v1::Placement& a, const v1::Placement& b,
-                                                 const v1::Wanted& wanted = {}) const {
+  absl::StatusOr<v1::CheckCollisionResponse> CheckPair(const v1::Placement& a,
+                                                       const v1::Placement& b,
+                                                       const v1::Wanted& wanted = {}) const {
     v1::CheckCollisionRequest request;
     *request.mutable_a() = a;
     *request.mutable_b() = b;

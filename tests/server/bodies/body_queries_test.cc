@@ -33,7 +33,7 @@ class BodyQueries : public BodyTest {
 
 TEST_F(BodyQueries, TheAnswerNamesThePieceThatDecided) {
   PutPair("pair");
-  const auto overlap = Ask(PlacementOf("cube", 5.5, 0.5, 0.5), PlacementOf("pair"));
+  const auto overlap = CheckPair(PlacementOf("cube", 5.5, 0.5, 0.5), PlacementOf("pair"));
   ASSERT_TRUE(overlap.ok()) << overlap.status();
   EXPECT_EQ(overlap->relation(), v1::RELATION_OVERLAPPING);
   EXPECT_FALSE(overlap->has_piece_a());
@@ -43,7 +43,7 @@ TEST_F(BodyQueries, TheAnswerNamesThePieceThatDecided) {
   EXPECT_EQ(overlap->hull_b().hull_id(), "pair");
   EXPECT_EQ(overlap->hull_b().revision(), MakeClient().GetBody("pair")->body().revision());
 
-  const auto apart = Ask(PlacementOf("pair"), PlacementOf("cube", 2, 0, 0));
+  const auto apart = CheckPair(PlacementOf("pair"), PlacementOf("cube", 2, 0, 0));
   EXPECT_EQ(apart->relation(), v1::RELATION_SEPARATED);
   EXPECT_FALSE(apart->has_piece_a());
 }
@@ -56,7 +56,7 @@ TEST_F(BodyQueries, DetailsBelongToTheNearestOrDeepestPair) {
   wanted.set_axis(true);
   wanted.set_analysis(true);
   wanted.set_clearance(1.5);
-  const auto apart = Ask(PlacementOf("pair"), PlacementOf("pair", 2.5, 0, 0), wanted);
+  const auto apart = CheckPair(PlacementOf("pair"), PlacementOf("pair", 2.5, 0, 0), wanted);
   ASSERT_TRUE(apart.ok()) << apart.status();
   EXPECT_EQ(apart->relation(), v1::RELATION_SEPARATED);
   EXPECT_NEAR(apart->separation().value(), 1.5, apart->separation().bound());
@@ -67,7 +67,7 @@ TEST_F(BodyQueries, DetailsBelongToTheNearestOrDeepestPair) {
   EXPECT_EQ(apart->axis().feature_a().vertex_indices_size(), 4);
   EXPECT_EQ(apart->analysis().size_a().vertices(), 8u);
 
-  const auto deep = Ask(PlacementOf("pair"), PlacementOf("cube", 4.75, 0, 0), wanted);
+  const auto deep = CheckPair(PlacementOf("pair"), PlacementOf("cube", 4.75, 0, 0), wanted);
   EXPECT_EQ(deep->relation(), v1::RELATION_OVERLAPPING);
   EXPECT_EQ(deep->piece_a().index(), 1u);
   EXPECT_NEAR(deep->separation().value(), -0.75, deep->separation().bound() + 1e-12);
@@ -86,7 +86,7 @@ TEST_F(BodyQueries, PosesComposeExactly) {
   q->set_z(0.9);
   v1::Placement right = left;
   right.set_hull_id("right");
-  EXPECT_EQ(Ask(left, right)->relation(), v1::RELATION_TOUCHING);
+  EXPECT_EQ(CheckPair(left, right)->relation(), v1::RELATION_TOUCHING);
 }
 
 TEST_F(BodyQueries, TheTextbookMethodIsOnlyForHulls) {
@@ -101,7 +101,7 @@ TEST_F(BodyQueries, TheTextbookMethodIsOnlyForHulls) {
 TEST_F(BodyQueries, AMissingPieceIsNamedUntilItExists) {
   Put("cube", Cube());
   ASSERT_TRUE(PutBody("b", {PlacementOf("cube"), PlacementOf("late", 5, 0, 0)}).ok());
-  const auto missing = Ask(PlacementOf("b"), PlacementOf("cube", 9, 0, 0));
+  const auto missing = CheckPair(PlacementOf("b"), PlacementOf("cube", 9, 0, 0));
   EXPECT_TRUE(absl::IsNotFound(missing.status()));
   EXPECT_EQ(ReasonOf(missing.status()), v1::ERROR_REASON_PIECE_NOT_FOUND);
   EXPECT_THAT(std::string(missing.status().message()),
@@ -110,26 +110,26 @@ TEST_F(BodyQueries, AMissingPieceIsNamedUntilItExists) {
   EXPECT_THAT(MetadataOf(missing.status(), "piece"), Optional(std::string("1")));
   EXPECT_THAT(MetadataOf(missing.status(), "hull_id"), Optional(std::string("late")));
   Put("late", Cube());
-  EXPECT_EQ(Ask(PlacementOf("b"), PlacementOf("cube", 5.5, 0, 0))->relation(),
+  EXPECT_EQ(CheckPair(PlacementOf("b"), PlacementOf("cube", 5.5, 0, 0))->relation(),
             v1::RELATION_OVERLAPPING);
   ASSERT_TRUE(Delete("late").ok());
-  EXPECT_EQ(ReasonOf(Ask(PlacementOf("b"), PlacementOf("cube")).status()),
+  EXPECT_EQ(ReasonOf(CheckPair(PlacementOf("b"), PlacementOf("cube")).status()),
             v1::ERROR_REASON_PIECE_NOT_FOUND);
   // A body cannot be a piece.
   ASSERT_TRUE(PutBody("late", {PlacementOf("cube")}).ok());
-  EXPECT_THAT(std::string(Ask(PlacementOf("b"), PlacementOf("cube")).status().message()),
+  EXPECT_THAT(std::string(CheckPair(PlacementOf("b"), PlacementOf("cube")).status().message()),
               HasSubstr("is a body; this call requires a hull"));
 }
 
 TEST_F(BodyQueries, APieceUsesTheCurrentVersionOfItsHull) {
   PutPair("pair");
-  EXPECT_EQ(Ask(PlacementOf("pair"), PlacementOf("cube", 2.5, 0, 0))->relation(),
+  EXPECT_EQ(CheckPair(PlacementOf("pair"), PlacementOf("cube", 2.5, 0, 0))->relation(),
             v1::RELATION_SEPARATED);
   Put("other", Cube());
   ::hulld::server::Appender appender(*hulls_, "cube", "grow");
   ASSERT_TRUE(appender.Append(1, {3, 0.5, 0.5}).has_value());
   ASSERT_TRUE(appender.Finish().ok());
-  const auto grown = Ask(PlacementOf("pair"), PlacementOf("other", 2.5, 0, 0));
+  const auto grown = CheckPair(PlacementOf("pair"), PlacementOf("other", 2.5, 0, 0));
   EXPECT_EQ(grown->relation(), v1::RELATION_OVERLAPPING);
   EXPECT_EQ(grown->piece_a().index(), 0u);
 }

@@ -200,7 +200,8 @@ TEST_F(BodyCalls, BodiesCountAgainstTheMemoryLimit) {
   EXPECT_TRUE(absl::IsResourceExhausted(second.status()));
   EXPECT_THAT(TextOf(second.status()), HasSubstr("--memory-limit"));
   // Memory is also insufficient for queries: each call copies the pieces.
-  EXPECT_TRUE(absl::IsResourceExhausted(Ask(PlacementOf("first"), PlacementOf("cube")).status()));
+  EXPECT_TRUE(
+      absl::IsResourceExhausted(CheckPair(PlacementOf("first"), PlacementOf("cube")).status()));
   // Refused or deleted bodies are no longer counted.
   ASSERT_TRUE(MakeClient().DeleteBody("first").ok());
   EXPECT_TRUE(PutBody("second", pieces).ok());
@@ -277,7 +278,7 @@ TEST_F(DurableBodies, ADamagedBodyIsNamedAndCanBeReplaced) {
   EXPECT_TRUE(absl::IsDataLoss(got.status()));
   EXPECT_EQ(ReasonOf(got.status()), v1::ERROR_REASON_BODY_DAMAGED);
   EXPECT_TRUE(client.ListAllBodies("")->bodies(0).damaged());
-  const auto answer = Ask(PlacementOf("pair"), PlacementOf("cube"));
+  const auto answer = CheckPair(PlacementOf("pair"), PlacementOf("cube"));
   EXPECT_EQ(ReasonOf(answer.status()), v1::ERROR_REASON_BODY_DAMAGED);
   EXPECT_TRUE(PutBody("pair", {PlacementOf("cube")}).ok());
   EXPECT_TRUE(client.GetBody("pair").ok());

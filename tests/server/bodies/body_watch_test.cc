@@ -62,7 +62,7 @@ class BodyWatches : public BodyTest {
     ASSERT_TRUE(appender.Finish().ok());
   }
   // Returns all messages up to the next with events or `synced`, merged.
-  static v1::WatchHullsResponse Told(HullWatch& watch) {
+  static v1::WatchHullsResponse NextMessage(HullWatch& watch) {
     while (true) {
       const auto message = watch.Next();
       EXPECT_TRUE(message.ok()) << message.status();
@@ -90,38 +90,38 @@ TEST_F(BodyWatches, WatchHullsReportsBodiesOnRequest) {
   const auto hulls = client_->WatchHulls(request);
   request.set_bodies(true);
   const auto both = client_->WatchHulls(request);
-  const v1::WatchHullsResponse there = Told(*both);
+  const v1::WatchHullsResponse there = NextMessage(*both);
   EXPECT_THAT(Texts(there), ElementsAre("PRESENT cube", "PRESENT pair of 2"));
   EXPECT_TRUE(there.events(0).has_box_min());
   EXPECT_FALSE(there.events(1).has_box_min());
   const v1::BodyInfo pair = client_->GetBody("pair")->body();
   EXPECT_EQ(there.events(1).hull().revision(), pair.revision());
   EXPECT_EQ(there.events(1).hull().create_revision(), pair.create_revision());
-  EXPECT_THAT(Texts(Told(*hulls)), ElementsAre("PRESENT cube"));
-  while (!Told(*both).synced()) {
+  EXPECT_THAT(Texts(NextMessage(*hulls)), ElementsAre("PRESENT cube"));
+  while (!NextMessage(*both).synced()) {
   }
-  while (!Told(*hulls).synced()) {
+  while (!NextMessage(*hulls).synced()) {
   }
 
   const auto put = PutBody("pair", {PlacementOf("cube")});
   ASSERT_TRUE(put.ok());
-  const v1::WatchHullsResponse again = Told(*both);
+  const v1::WatchHullsResponse again = NextMessage(*both);
   EXPECT_THAT(Texts(again), ElementsAre("CHANGED pair of 1"));
   EXPECT_EQ(again.events(0).hull().revision(), put->body().revision());
   EXPECT_EQ(again.events(0).hull().create_revision(), pair.create_revision());
   // A piece grows: the event is about the hull.
   Grow("cube", {3, 0, 0});
-  EXPECT_THAT(Texts(Told(*both)), ElementsAre("CHANGED cube"));
-  EXPECT_THAT(Texts(Told(*hulls)), ElementsAre("CHANGED cube"));
+  EXPECT_THAT(Texts(NextMessage(*both)), ElementsAre("CHANGED cube"));
+  EXPECT_THAT(Texts(NextMessage(*hulls)), ElementsAre("CHANGED cube"));
   const auto deleted = client_->DeleteBody("pair");
   ASSERT_TRUE(deleted.ok());
-  const v1::WatchHullsResponse gone = Told(*both);
+  const v1::WatchHullsResponse gone = NextMessage(*both);
   EXPECT_THAT(Texts(gone), ElementsAre("DELETED pair of 0"));
   EXPECT_EQ(gone.events(0).hull().revision(), deleted->header().revision());
   // Its ID may now be a hull's.
   Put("pair", Cube());
-  EXPECT_EQ(Texts(Told(*both)).front(), "CREATED pair");
-  EXPECT_EQ(Texts(Told(*hulls)).front(), "CREATED pair");
+  EXPECT_EQ(Texts(NextMessage(*both)).front(), "CREATED pair");
+  EXPECT_EQ(Texts(NextMessage(*hulls)).front(), "CREATED pair");
 }
 
 TEST_F(BodyWatches, OneBodyIsWatchedByItsId) {
@@ -129,10 +129,10 @@ TEST_F(BodyWatches, OneBodyIsWatchedByItsId) {
   request.set_hull_id("pair");
   request.set_bodies(true);
   const auto watch = client_->WatchHulls(request);
-  EXPECT_THAT(Texts(Told(*watch)), IsEmpty());
+  EXPECT_THAT(Texts(NextMessage(*watch)), IsEmpty());
   PutPair("other");
   PutPair("pair");
-  EXPECT_THAT(Texts(Told(*watch)), ElementsAre("CREATED pair of 2"));
+  EXPECT_THAT(Texts(NextMessage(*watch)), ElementsAre("CREATED pair of 2"));
 }
 
 TEST_F(BodyWatches, CollisionsFollowMotionPiecesAndTheirHulls) {
@@ -151,68 +151,68 @@ TEST_F(BodyWatches, CollisionsFollowMotionPiecesAndTheirHulls) {
   EXPECT_THAT(Texts(first), IsEmpty());
 
   Put("probe", Cube());
-  v1::WatchCollisionsResponse told = Change(*watch);
-  while (told.events().empty()) told = Change(*watch);
-  EXPECT_THAT(Texts(told), ElementsAre("ENTER 0 1 1 -"));
-  EXPECT_EQ(told.events(0).revision_a(), first.hulls(0).revision());
-  EXPECT_EQ(told.events(0).piece_a().hull().revision(), first.piece_hulls(0).revision());
+  v1::WatchCollisionsResponse message = Change(*watch);
+  while (message.events().empty()) message = Change(*watch);
+  EXPECT_THAT(Texts(message), ElementsAre("ENTER 0 1 1 -"));
+  EXPECT_EQ(message.events(0).revision_a(), first.hulls(0).revision());
+  EXPECT_EQ(message.events(0).piece_a().hull().revision(), first.piece_hulls(0).revision());
   v1::CollisionWatchUpdate update;
   update.add_placements(1);
   for (const double number : {1.0, 0.0, 0.0, 0.0, 2.5, 0.0, 0.0}) update.add_poses(number);
   ASSERT_TRUE(watch->Update(update).ok());
-  told = Round(*watch);
-  while (told.update() == 0) told = Round(*watch);
-  EXPECT_THAT(Texts(told), ElementsAre("EXIT 0 1 - -"));
+  message = Round(*watch);
+  while (message.update() == 0) message = Round(*watch);
+  EXPECT_THAT(Texts(message), ElementsAre("EXIT 0 1 - -"));
 
   // A piece grows up to the probe.
   Grow("cube", {2.5, 0.5, 0.5});
-  told = Change(*watch);
-  EXPECT_THAT(Texts(told), ElementsAre("TOUCH 0 1 0 -"));
-  ASSERT_EQ(told.hulls_size(), 1);
-  EXPECT_EQ(told.hulls(0).hull_id(), "pair");
-  EXPECT_EQ(told.hulls(0).revision(), first.hulls(0).revision());
-  ASSERT_EQ(told.piece_hulls_size(), 1);
-  EXPECT_EQ(told.piece_hulls(0).revision(), Get("cube").hull().revision());
-  EXPECT_EQ(told.events(0).piece_a().hull().revision(), Get("cube").hull().revision());
-  EXPECT_GE(told.header().revision(), Get("cube").hull().revision());
+  message = Change(*watch);
+  EXPECT_THAT(Texts(message), ElementsAre("TOUCH 0 1 0 -"));
+  ASSERT_EQ(message.hulls_size(), 1);
+  EXPECT_EQ(message.hulls(0).hull_id(), "pair");
+  EXPECT_EQ(message.hulls(0).revision(), first.hulls(0).revision());
+  ASSERT_EQ(message.piece_hulls_size(), 1);
+  EXPECT_EQ(message.piece_hulls(0).revision(), Get("cube").hull().revision());
+  EXPECT_EQ(message.events(0).piece_a().hull().revision(), Get("cube").hull().revision());
+  EXPECT_GE(message.header().revision(), Get("cube").hull().revision());
 
   // Put again, with a hull not previously followed.
   Put("block", Cube());
   const auto put = PutBody("pair", {PlacementOf("block", 30, 0, 0), PlacementOf("block", 2, 0, 0)});
   ASSERT_TRUE(put.ok());
-  told = Change(*watch);
-  EXPECT_THAT(Texts(told), ElementsAre("ENTER 0 1 1 -"));
-  EXPECT_EQ(told.events(0).revision_a(), put->body().revision());
-  ASSERT_EQ(told.piece_hulls_size(), 1);
-  EXPECT_EQ(told.piece_hulls(0).hull_id(), "block");
-  // Former pieces are no longer followed.
+  message = Change(*watch);
+  EXPECT_THAT(Texts(message), ElementsAre("ENTER 0 1 1 -"));
+  EXPECT_EQ(message.events(0).revision_a(), put->body().revision());
+  ASSERT_EQ(message.piece_hulls_size(), 1);
+  EXPECT_EQ(message.piece_hulls(0).hull_id(), "block");
+  // Pieces that were removed are no longer followed.
   Grow("cube", {9, 9, 9});
   Grow("block", {0.5, 0.5, 4});
-  told = Change(*watch);
-  EXPECT_THAT(Texts(told), IsEmpty());
-  ASSERT_EQ(told.piece_hulls_size(), 1);
-  EXPECT_EQ(told.piece_hulls(0).revision(), Get("block").hull().revision());
+  message = Change(*watch);
+  EXPECT_THAT(Texts(message), IsEmpty());
+  ASSERT_EQ(message.piece_hulls_size(), 1);
+  EXPECT_EQ(message.piece_hulls(0).revision(), Get("block").hull().revision());
 
   ASSERT_TRUE(Delete("block").ok());
-  told = Change(*watch);
-  EXPECT_THAT(Texts(told), ElementsAre("LOST 0 1 - -"));
-  ASSERT_EQ(told.placement_problems_size(), 1);
-  EXPECT_EQ(told.placement_problems(0).reason(), v1::ERROR_REASON_PIECE_NOT_FOUND);
-  EXPECT_THAT(told.placement_problems(0).message(), HasSubstr("hull \"block\" not found"));
+  message = Change(*watch);
+  EXPECT_THAT(Texts(message), ElementsAre("LOST 0 1 - -"));
+  ASSERT_EQ(message.placement_problems_size(), 1);
+  EXPECT_EQ(message.placement_problems(0).reason(), v1::ERROR_REASON_PIECE_NOT_FOUND);
+  EXPECT_THAT(message.placement_problems(0).message(), HasSubstr("hull \"block\" not found"));
   // It is created again and noticed, although the body lacked it.
   Put("block", Cube());
-  told = Change(*watch);
-  while (told.events().empty()) told = Change(*watch);
-  EXPECT_THAT(Texts(told), ElementsAre("ENTER 0 1 1 -"));
+  message = Change(*watch);
+  while (message.events().empty()) message = Change(*watch);
+  EXPECT_THAT(Texts(message), ElementsAre("ENTER 0 1 1 -"));
   ASSERT_TRUE(client_->DeleteBody("pair").ok());
-  told = Change(*watch);
-  EXPECT_THAT(Texts(told), ElementsAre("LOST 0 1 - -"));
-  EXPECT_EQ(told.placement_problems(0).reason(), v1::ERROR_REASON_HULL_NOT_FOUND);
+  message = Change(*watch);
+  EXPECT_THAT(Texts(message), ElementsAre("LOST 0 1 - -"));
+  EXPECT_EQ(message.placement_problems(0).reason(), v1::ERROR_REASON_HULL_NOT_FOUND);
   // The ID becomes a hull's, and the watch continues with it.
   Put("pair", {2.5, 0, 0, 3, 0, 0, 2.5, 1, 0, 2.5, 0, 1});
-  told = Change(*watch);
-  while (told.events().empty()) told = Change(*watch);
-  EXPECT_THAT(Texts(told), ElementsAre("ENTER 0 1 - -"));
+  message = Change(*watch);
+  while (message.events().empty()) message = Change(*watch);
+  EXPECT_THAT(Texts(message), ElementsAre("ENTER 0 1 - -"));
 }
 
 TEST_F(BodyWatches, ClearancesBelongToTheNearestPieces) {
@@ -237,9 +237,9 @@ TEST_F(BodyWatches, ABodyIsWatchedBeforeItsHullsExist) {
   const auto watch = client_->WatchCollisions(open);
   EXPECT_EQ(Round(*watch).placement_problems_size(), 1);
   Put("unborn", Cube());
-  v1::WatchCollisionsResponse told = Change(*watch);
-  while (told.events().empty()) told = Change(*watch);
-  EXPECT_THAT(Texts(told), ElementsAre("ENTER 0 1 0 -"));
+  v1::WatchCollisionsResponse message = Change(*watch);
+  while (message.events().empty()) message = Change(*watch);
+  EXPECT_THAT(Texts(message), ElementsAre("ENTER 0 1 0 -"));
 }
 
 // A watch's events agree with a batch at all times.
@@ -256,7 +256,7 @@ TEST_F(BodyWatches, AgreeWithBatchesAfterEveryChange) {
   }
   for (const std::string& hull : hulls) Put(hull, Cube());
   const auto watch = client_->WatchCollisions(open);
-  std::map<std::pair<uint32_t, uint32_t>, v1::Relation> told;
+  std::map<std::pair<uint32_t, uint32_t>, v1::Relation> reported;
   uint64_t told_revision = 0;
   int collisions = 0;
   for (int step = 0; step < 200; ++step) {
@@ -321,14 +321,14 @@ TEST_F(BodyWatches, AgreeWithBatchesAfterEveryChange) {
       told_revision = round.header().revision();
       for (const v1::CollisionEvent& event : round.events()) {
         const std::pair pair(event.placement_a(), event.placement_b());
-        told.erase(pair);
+        reported.erase(pair);
         if (event.relation() == v1::RELATION_TOUCHING ||
             event.relation() == v1::RELATION_OVERLAPPING) {
-          told[pair] = event.relation();
+          reported[pair] = event.relation();
         }
       }
     }
-    ASSERT_EQ(told, expected) << "step " << step;
+    ASSERT_EQ(reported, expected) << "step " << step;
     collisions += static_cast<int>(expected.size());
   }
   EXPECT_GT(collisions, 30);

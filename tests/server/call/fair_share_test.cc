@@ -171,16 +171,16 @@ TEST_F(FairShare, CallsWithoutATokenKeepNoConnectionFromEviction) {
   EXPECT_EQ(connections_.Evict(), 1);
 }
 
-TEST_F(FairShare, CallsOfAClientWithManyAreMarked) {
+TEST_F(FairShare, CallsOfABusyClientAreMarked) {
   Begin(Limits());
-  for (uint64_t i = 0; i < Admission::kFewCalls; ++i) {
+  for (uint64_t i = 0; i < Admission::kBusyCalls; ++i) {
     EXPECT_EQ(Refusal(Rpc::kCheckCollision, "a"), "");
-    EXPECT_FALSE(tickets_.back().is_one_of_many());
+    EXPECT_FALSE(tickets_.back().is_client_busy());
   }
   EXPECT_EQ(Refusal(Rpc::kCheckCollision, "a"), "");
-  EXPECT_TRUE(tickets_.back().is_one_of_many());
+  EXPECT_TRUE(tickets_.back().is_client_busy());
   EXPECT_EQ(Refusal(Rpc::kCheckCollision, "b"), "");
-  EXPECT_FALSE(tickets_.back().is_one_of_many());
+  EXPECT_FALSE(tickets_.back().is_client_busy());
 }
 
 TEST(CallLifetime, DeadlinesDoNotFollowTheTimeOfDay) {

@@ -29,8 +29,8 @@ using ::testing::HasSubstr;
 
 constexpr uint64_t kAny = std::numeric_limits<uint64_t>::max();
 
-uint64_t ParsedBytes(const Message& type, const std::string& bytes, uint64_t most = kAny) {
-  return MessageLayout::Of(*type.GetDescriptor()).ParsedBytes(bytes, most);
+uint64_t ParsedBytes(const Message& type, const std::string& bytes, uint64_t limit = kAny) {
+  return MessageLayout::Of(*type.GetDescriptor()).ParsedBytes(bytes, limit);
 }
 
 // Returns `text` in slices of this many bytes.
@@ -170,7 +170,7 @@ TEST(RequestMemory, DistinguishesTooLargeFromWaiting) {
   EXPECT_EQ(ReasonOf(waiting), v1::ERROR_REASON_OVERLOADED);
   EXPECT_TRUE(RetryAfter(waiting).has_value());
   EXPECT_EQ(memory.taken_bytes(), 600u);
-  first.GiveBack();
+  first.Release();
   EXPECT_TRUE(memory.Take(600, second).ok());
 }
 

@@ -72,7 +72,7 @@ class TestQueue : public QueuedStream<WriteReactor, Batch> {
   void Open() override { script_(std::static_pointer_cast<TestQueue>(shared_from_this())); }
   void StartWork() override {}
   bool IsWorking() const override { return working_; }
-  bool KeepsWaiting() override { return keeps_waiting_; }
+  bool ShouldDelayWrite() override { return keeps_waiting_; }
 
   const Script script_;
   const std::shared_ptr<Signal> gone_;
@@ -169,7 +169,7 @@ class StreamBases : public ::testing::Test, public Collisions, public Hulls {
   std::unique_ptr<grpc::Server> server_;
 };
 
-TEST_F(StreamBases, AnEndThatIsSetWhileWritingComesAfterAllReplies) {
+TEST_F(StreamBases, AStatusSetDuringAWriteFollowsAllReplies) {
   std::vector<uint64_t> numbers;
   const grpc::Status status = Run(
       [](const std::shared_ptr<TestQueue>& stream) {
@@ -182,7 +182,7 @@ TEST_F(StreamBases, AnEndThatIsSetWhileWritingComesAfterAllReplies) {
   EXPECT_THAT(numbers, ElementsAre(1, 2, 3, 4, 5));
 }
 
-TEST_F(StreamBases, AnErrorComesAfterTheRepliesBeforeIt) {
+TEST_F(StreamBases, AnErrorFollowsEarlierReplies) {
   std::vector<uint64_t> numbers;
   const grpc::Status status = Run(
       [](const std::shared_ptr<TestQueue>& stream) {

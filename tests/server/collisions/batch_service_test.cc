@@ -463,8 +463,8 @@ TEST_F(BatchCall, ConflictingOptionsFailTheWholeCall) {
   ExpectRefused(request, grpc::StatusCode::INVALID_ARGUMENT, "tolerance is NaN");
 }
 
-// Like the previous test, but requests measures of every pair, at an unpredictable cost.
-TEST_F(BatchCall, CancellingEndsALongBatchOfMeasures) {
+// Like the previous test, but requests details of every pair, at an unpredictable cost.
+TEST_F(BatchCall, CancellingEndsALongBatchWithDetails) {
   Put("ball", Sphere(2000));
   v1::BatchCheckCollisionsRequest request;
   *request.add_placements() = PlacementOf("ball");

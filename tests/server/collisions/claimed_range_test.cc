@@ -23,11 +23,11 @@ TEST(ClaimedRange, BlocksAreDisjointAndTheLastReturnIsReported) {
   EXPECT_EQ(third.begin, 0U);
   EXPECT_EQ(third.end, 2U);
   EXPECT_TRUE(range.Claim(4).empty());
-  EXPECT_FALSE(range.GiveBack(second));
-  EXPECT_FALSE(range.GiveBack(first));
-  EXPECT_TRUE(range.GiveBack(third));
+  EXPECT_FALSE(range.Complete(second));
+  EXPECT_FALSE(range.Complete(first));
+  EXPECT_TRUE(range.Complete(third));
   range.Begin(1);
-  EXPECT_TRUE(range.GiveBack(range.Claim(4)));
+  EXPECT_TRUE(range.Complete(range.Claim(4)));
 }
 
 // Models the steps of a stream: the thread that ends one range begins the next, while other threads
@@ -45,7 +45,7 @@ TEST(ClaimedRange, RangesThatFollowEachOtherAreEachDoneOnce) {
     while (!is_over) {
       const ClaimedRange::Block block = range.Claim(7);
       for (uint32_t i = block.begin; i < block.end; ++i) ++done[i];
-      if (block.empty() || !range.GiveBack(block)) continue;
+      if (block.empty() || !range.Complete(block)) continue;
       ++ended;
       for (const int times : done) wrong += times == ended ? 0 : 1;
       if (ended == kRanges) {

@@ -169,7 +169,7 @@ TEST_F(CheckCollisionCall, MalformedOrConflictingRequestsAreRejected) {
   exclude([](auto* r) { r->mutable_wanted()->set_clearance(1); }, "wanted.clearance");
 }
 
-TEST_F(CheckCollisionCall, MeasuresAreReturnedOnRequest) {
+TEST_F(CheckCollisionCall, DetailsAreReturnedOnRequest) {
   Put("cube", Cube());
   Create("empty");
   const auto check = [&](const v1::Placement& b, double clearance) {

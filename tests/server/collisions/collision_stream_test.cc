@@ -75,7 +75,7 @@ class Stream {
     return answer;
   }
 
-  v1::StreamCollisionsResponse Ask(const v1::StreamCollisionsRequest& request) {
+  v1::StreamCollisionsResponse Exchange(const v1::StreamCollisionsRequest& request) {
     Send(request);
     return Read();
   }
@@ -128,7 +128,7 @@ class StreamCollisionsCall : public ServerTest {
 TEST_F(StreamCollisionsCall, OpenIsAnsweredByEveryPair) {
   Put("cube", Cube());
   Stream stream(*collisions_);
-  const auto answer = stream.Ask(Open(
+  const auto answer = stream.Exchange(Open(
       {PlacementOf("cube"), PlacementOf("cube", 1), PlacementOf("cube", 3), PlacementOf("none")},
       {0, 1, 0, 2, 0, 0, 3, 1}));
   EXPECT_EQ(answer.update(), 0);
@@ -149,19 +149,19 @@ TEST_F(StreamCollisionsCall, OpenIsAnsweredByEveryPair) {
 TEST_F(StreamCollisionsCall, UpdatesAreAnsweredByThePairsThatMoved) {
   Put("cube", Cube());
   Stream stream(*collisions_);
-  stream.Ask(Open({PlacementOf("cube"), PlacementOf("cube", 1), PlacementOf("cube", 3)},
-                  {0, 1, 1, 2, 0, 2, 2, 2}));
-  auto answer = stream.Ask(MoveX(1, 2));
+  stream.Exchange(Open({PlacementOf("cube"), PlacementOf("cube", 1), PlacementOf("cube", 3)},
+                       {0, 1, 1, 2, 0, 2, 2, 2}));
+  auto answer = stream.Exchange(MoveX(1, 2));
   EXPECT_EQ(answer.update(), 1);
   EXPECT_THAT(answer.pairs(), ElementsAre(0, 1));
   EXPECT_THAT(answer.columns().relations(),
               ElementsAre(v1::RELATION_SEPARATED, v1::RELATION_TOUCHING));
   EXPECT_EQ(answer.hulls_size(), 0);
   EXPECT_GT(answer.header().revision(), 0);
-  answer = stream.Ask(Move({}));
+  answer = stream.Exchange(Move({}));
   EXPECT_EQ(answer.update(), 2);
   EXPECT_THAT(answer.pairs(), IsEmpty());
-  answer = stream.Ask(Move({{2, {1, 0, 0, 0, 0.5, 0, 0}}, {0, {1, 0, 0, 0, 9, 0, 0}}}));
+  answer = stream.Exchange(Move({{2, {1, 0, 0, 0, 0.5, 0, 0}}, {0, {1, 0, 0, 0, 9, 0, 0}}}));
   EXPECT_THAT(answer.pairs(), ElementsAre(0, 1, 2, 3));
   EXPECT_TRUE(stream.Finish().ok());
 }
@@ -172,13 +172,13 @@ TEST_F(StreamCollisionsCall, OnlyChangesOmitsUnchangedPairs) {
   auto open =
       Open({PlacementOf("cube"), PlacementOf("cube", 5), PlacementOf("cube", 1)}, {0, 1, 1, 2});
   open.mutable_open()->set_only_changes(true);
-  EXPECT_THAT(stream.Ask(open).pairs(), ElementsAre(0, 1));
-  EXPECT_THAT(stream.Ask(MoveX(1, 4)).pairs(), IsEmpty());
-  const auto answer = stream.Ask(MoveX(1, 2));
+  EXPECT_THAT(stream.Exchange(open).pairs(), ElementsAre(0, 1));
+  EXPECT_THAT(stream.Exchange(MoveX(1, 4)).pairs(), IsEmpty());
+  const auto answer = stream.Exchange(MoveX(1, 2));
   EXPECT_THAT(answer.pairs(), ElementsAre(1));
   EXPECT_THAT(answer.columns().relations(), ElementsAre(v1::RELATION_TOUCHING));
-  EXPECT_THAT(stream.Ask(MoveX(1, 2)).pairs(), IsEmpty());
-  EXPECT_THAT(stream.Ask(MoveX(1, 0.5)).pairs(), ElementsAre(0, 1));
+  EXPECT_THAT(stream.Exchange(MoveX(1, 2)).pairs(), IsEmpty());
+  EXPECT_THAT(stream.Exchange(MoveX(1, 0.5)).pairs(), ElementsAre(0, 1));
   EXPECT_TRUE(stream.Finish().ok());
 }
 
@@ -191,7 +191,7 @@ TEST_F(StreamCollisionsCall, EveryStepEqualsASingleCheck) {
   placements.reserve(ids.size());
   for (const std::string& id : ids) placements.push_back(PlacementOf(id, 1.5 * placements.size()));
   Stream stream(*collisions_);
-  auto answer = stream.Ask(Open(placements, {0, 1, 1, 2, 2, 3, 3, 0, 0, 2}));
+  auto answer = stream.Exchange(Open(placements, {0, 1, 1, 2, 2, 3, 3, 0, 0, 2}));
   const uint32_t pairs[][2] = {{0, 1}, {1, 2}, {2, 3}, {3, 0}, {0, 2}};
   std::mt19937 random(9);
   std::uniform_real_distribution<double> step(-0.1, 0.1);
@@ -203,9 +203,9 @@ TEST_F(StreamCollisionsCall, EveryStepEqualsASingleCheck) {
     pose->mutable_rotation()->set_w(1);
     pose->mutable_rotation()->set_x(pose->rotation().x() + step(random));
     pose->mutable_translation()->set_x(pose->translation().x() * 0.95 + step(random));
-    answer = stream.Ask(Move({{moved,
-                               {1, pose->rotation().x(), 0, 0, pose->translation().x(),
-                                pose->translation().y(), pose->translation().z()}}}));
+    answer = stream.Exchange(Move({{moved,
+                                    {1, pose->rotation().x(), 0, 0, pose->translation().x(),
+                                     pose->translation().y(), pose->translation().z()}}}));
     ASSERT_GE(answer.pairs_size(), 2) << i;
     for (int k = 0; k < answer.pairs_size(); ++k) {
       v1::CheckCollisionRequest single;
@@ -226,7 +226,7 @@ TEST_F(StreamCollisionsCall, AnEmptyHullIsDecidedByTheSameRungAsInASingleCheck) 
   Put("cube", Cube());
   Create("empty");
   Stream stream(*collisions_);
-  const auto answer = stream.Ask(Open({PlacementOf("cube"), PlacementOf("empty")}, {0, 1}));
+  const auto answer = stream.Exchange(Open({PlacementOf("cube"), PlacementOf("empty")}, {0, 1}));
   v1::CheckCollisionRequest single;
   *single.mutable_a() = PlacementOf("cube");
   *single.mutable_b() = PlacementOf("empty");
@@ -239,27 +239,27 @@ TEST_F(StreamCollisionsCall, HullsChangeOnlyWhenRefreshed) {
   Put("target", Cube(5, 1));
   Stream stream(*collisions_);
   const auto target = PlacementOf("target");
-  auto answer = stream.Ask(
+  auto answer = stream.Exchange(
       Open({PlacementOf("grows"), target, target, PlacementOf("later")}, {0, 1, 1, 2, 3, 1}));
   EXPECT_THAT(
       answer.columns().relations(),
       ElementsAre(v1::RELATION_SEPARATED, v1::RELATION_OVERLAPPING, v1::RELATION_UNSPECIFIED));
   ASSERT_TRUE(Appender(*hulls_, "grows", "w").Append(1, Cube(0, 10)).has_value());
   Put("later", Cube(5.5, 9));
-  answer = stream.Ask(Move({{0, {1, 0, 0, 0, 0, 0, 0}}}));
+  answer = stream.Exchange(Move({{0, {1, 0, 0, 0, 0, 0, 0}}}));
   EXPECT_THAT(answer.columns().relations(), ElementsAre(v1::RELATION_SEPARATED));
-  answer = stream.Ask(Refresh());
+  answer = stream.Exchange(Refresh());
   EXPECT_THAT(answer.pairs(), ElementsAre(0, 2));
   EXPECT_THAT(answer.columns().relations(),
               ElementsAre(v1::RELATION_OVERLAPPING, v1::RELATION_OVERLAPPING));
   ASSERT_EQ(answer.hulls_size(), 4);
   EXPECT_EQ(answer.hulls(0).revision(), Get("grows").hull().revision());
   EXPECT_EQ(answer.placement_problems_size(), 0);
-  EXPECT_THAT(stream.Ask(Refresh()).pairs(), IsEmpty());
+  EXPECT_THAT(stream.Exchange(Refresh()).pairs(), IsEmpty());
   // Smaller hulls under the same names: cached pair state names vertices that no longer exist.
   ASSERT_TRUE(Delete("grows").ok() && Delete("later").ok());
   Put("grows", {5, 5, 5});
-  answer = stream.Ask(Refresh());
+  answer = stream.Exchange(Refresh());
   EXPECT_THAT(answer.pairs(), ElementsAre(0, 2));
   EXPECT_THAT(answer.columns().relations(),
               ElementsAre(v1::RELATION_TOUCHING, v1::RELATION_UNSPECIFIED));
@@ -275,7 +275,7 @@ TEST_F(StreamCollisionsCall, AGrowingHullIsQueriedAtEveryStep) {
   Appender appender(*hulls_, "grows", "w");
   Stream stream(*collisions_);
   const auto opened =
-      stream.Ask(Open({PlacementOf("grows", -2), PlacementOf("ball")}, {0, 1, 1, 0}));
+      stream.Exchange(Open({PlacementOf("grows", -2), PlacementOf("ball")}, {0, 1, 1, 0}));
   EXPECT_THAT(opened.columns().relations(),
               ElementsAre(v1::RELATION_SEPARATED, v1::RELATION_SEPARATED));
   std::mt19937 random(7);
@@ -289,9 +289,9 @@ TEST_F(StreamCollisionsCall, AGrowingHullIsQueriedAtEveryStep) {
     // Both together, then separately.
     const double x = -2 - coordinate(random);
     v1::StreamCollisionsRequest move = MoveX(0, x);
-    if (i % 2 == 0) stream.Ask(Refresh());
+    if (i % 2 == 0) stream.Exchange(Refresh());
     if (i % 2 == 1) move.mutable_update()->set_refresh_hulls(true);
-    const v1::StreamCollisionsResponse answer = stream.Ask(move);
+    const v1::StreamCollisionsResponse answer = stream.Exchange(move);
     v1::CheckCollisionRequest single;
     *single.mutable_a() = PlacementOf("grows", x);
     *single.mutable_b() = PlacementOf("ball");
@@ -308,11 +308,11 @@ TEST_F(StreamCollisionsCall, AMoveReplacesAMalformedPose) {
   Put("cube", Cube());
   Stream stream(*collisions_);
   const auto bad = PlacementOf("cube", std::numeric_limits<double>::quiet_NaN());
-  auto answer = stream.Ask(Open({PlacementOf("cube"), bad}, {0, 1}));
+  auto answer = stream.Exchange(Open({PlacementOf("cube"), bad}, {0, 1}));
   EXPECT_THAT(answer.columns().relations(), ElementsAre(v1::RELATION_UNSPECIFIED));
   EXPECT_THAT(answer.placement_problems(0).message(),
               HasSubstr("placements[1].pose.translation.x is NaN"));
-  answer = stream.Ask(MoveX(1, 1));
+  answer = stream.Exchange(MoveX(1, 1));
   EXPECT_THAT(answer.columns().relations(), ElementsAre(v1::RELATION_TOUCHING));
   EXPECT_TRUE(stream.Finish().ok());
 }
@@ -354,7 +354,7 @@ TEST_F(StreamCollisionsCall, LongAnswersComeInPiecesOfAMebibyte) {
   open.mutable_open()->mutable_wanted()->set_axis(true);
   Stream stream(*collisions_);
   for (const auto& message : {open, MoveX(1, 2)}) {
-    const auto answer = stream.Ask(message);
+    const auto answer = stream.Exchange(message);
     ASSERT_EQ(answer.pairs_size(), 20'000);
     EXPECT_GT(stream.pieces, 2);
     EXPECT_LT(stream.largest_piece, (1 << 20) + 4096);
@@ -384,7 +384,7 @@ TEST_F(StreamCollisionsCall, ManyPairsAreAnsweredAsInABatch) {
   }
   batch.mutable_pairs()->Assign(pairs.begin(), pairs.end());
   Stream stream(*collisions_);
-  auto answer = stream.Ask(Open(placements, pairs));
+  auto answer = stream.Exchange(Open(placements, pairs));
   for (int step = 0; step < 3; ++step) {
     std::vector<std::pair<uint32_t, PoseNumbers>> moves;
     for (uint32_t i = 0; i < kPlacements; ++i) {
@@ -392,7 +392,7 @@ TEST_F(StreamCollisionsCall, ManyPairsAreAnsweredAsInABatch) {
       placements[i].mutable_pose()->mutable_translation()->set_x(x);
       moves.push_back({i, {1, 0, 0, 0, x, 0, 0}});
     }
-    if (step > 0) answer = stream.Ask(Move(moves));
+    if (step > 0) answer = stream.Exchange(Move(moves));
     batch.mutable_placements()->Assign(placements.begin(), placements.end());
     const std::vector<int> expected = BatchRelations(batch);
     ASSERT_EQ(expected.size(), pairs.size() / 2);
@@ -416,18 +416,18 @@ TEST_F(StreamCollisionsCall, ManyPlacementsThatMoveMayHaveFewPairsOrNone) {
   std::vector<v1::Placement> placements;
   for (uint32_t i = 0; i < kPlacements; ++i) placements.push_back(PlacementOf("cube", 10.0 * i));
   Stream stream(*collisions_);
-  EXPECT_EQ(stream.Ask(Open(placements, {0, kPlacements - 1})).pairs_size(), 1);
+  EXPECT_EQ(stream.Exchange(Open(placements, {0, kPlacements - 1})).pairs_size(), 1);
   const auto move_from = [&](uint32_t first, double x) {
     std::vector<std::pair<uint32_t, PoseNumbers>> moves;
     for (uint32_t i = first; i < kPlacements; ++i) moves.push_back({i, {1, 0, 0, 0, x, 0, 0}});
-    return stream.Ask(Move(moves));
+    return stream.Exchange(Move(moves));
   };
   const auto together = move_from(0, 1);
   ASSERT_EQ(together.pairs_size(), 1);
   EXPECT_EQ(together.columns().relations(0), v1::RELATION_OVERLAPPING);
   std::vector<std::pair<uint32_t, PoseNumbers>> others;
   for (uint32_t i = 1; i + 1 < kPlacements; ++i) others.push_back({i, {1, 0, 0, 0, -30, 0, 0}});
-  EXPECT_EQ(stream.Ask(Move(others)).pairs_size(), 0);
+  EXPECT_EQ(stream.Exchange(Move(others)).pairs_size(), 0);
   const auto apart = move_from(1, 20);
   ASSERT_EQ(apart.pairs_size(), 1);
   EXPECT_EQ(apart.columns().relations(0), v1::RELATION_SEPARATED);
@@ -455,25 +455,25 @@ TEST_F(StreamCollisionsCall, RandomStepsAreAnsweredAsInABatch) {
   for (int i = 0; i < 3000; ++i)
     pairs.insert(pairs.end(), {below(kPlacements), below(kPlacements)});
   Stream stream(*collisions_);
-  auto answer = stream.Ask(Open(placements, pairs));
-  std::vector<char> is_asked(pairs.size() / 2, true);
+  auto answer = stream.Exchange(Open(placements, pairs));
+  std::vector<char> is_due(pairs.size() / 2, true);
   for (int step = 0; step <= kSteps; ++step) {
     v1::BatchCheckCollisionsRequest batch;
     batch.mutable_placements()->Assign(placements.begin(), placements.end());
-    std::vector<uint32_t> asked;
-    for (uint32_t i = 0; i < is_asked.size(); ++i) {
-      if (!is_asked[i]) continue;
-      asked.push_back(i);
+    std::vector<uint32_t> due;
+    for (uint32_t i = 0; i < is_due.size(); ++i) {
+      if (!is_due[i]) continue;
+      due.push_back(i);
       batch.add_pairs(pairs[2 * i]);
       batch.add_pairs(pairs[2 * i + 1]);
     }
-    ASSERT_THAT(answer.pairs(), ::testing::ElementsAreArray(asked)) << "step " << step;
+    ASSERT_THAT(answer.pairs(), ::testing::ElementsAreArray(due)) << "step " << step;
     ASSERT_THAT(answer.columns().relations(), ::testing::ElementsAreArray(BatchRelations(batch)))
         << "step " << step;
-    is_asked.assign(is_asked.size(), false);
+    is_due.assign(is_due.size(), false);
     const auto ask_about = [&](auto holds) {
-      for (uint32_t i = 0; i < is_asked.size(); ++i) {
-        if (holds(pairs[2 * i]) || holds(pairs[2 * i + 1])) is_asked[i] = true;
+      for (uint32_t i = 0; i < is_due.size(); ++i) {
+        if (holds(pairs[2 * i]) || holds(pairs[2 * i + 1])) is_due[i] = true;
       }
     };
     std::vector<uint32_t> order(kPlacements);
@@ -497,7 +497,7 @@ TEST_F(StreamCollisionsCall, RandomStepsAreAnsweredAsInABatch) {
     } else if (below(8) == 0) {
       request.mutable_update()->set_refresh_hulls(true);
     }
-    answer = stream.Ask(request);
+    answer = stream.Exchange(request);
   }
   EXPECT_TRUE(stream.Finish().ok());
 }
@@ -520,7 +520,7 @@ TEST_F(StreamCollisionsCall, OnlyChangesAgreesWithABatch) {
   v1::StreamCollisionsRequest open = Open(placements, pairs);
   open.mutable_open()->set_only_changes(true);
   Stream stream(*collisions_);
-  EXPECT_EQ(stream.Ask(open).pairs_size(), pairs.size() / 2);
+  EXPECT_EQ(stream.Exchange(open).pairs_size(), pairs.size() / 2);
   for (int step = 1; step <= 5; ++step) {
     std::vector<std::pair<uint32_t, PoseNumbers>> moves;
     for (uint32_t i = 0; i < kPlacements; ++i) {
@@ -534,7 +534,7 @@ TEST_F(StreamCollisionsCall, OnlyChangesAgreesWithABatch) {
     for (uint32_t i = 0; i < now.size(); ++i) {
       if (now[i] != before[i]) changed.push_back(i);
     }
-    const auto answer = stream.Ask(Move(moves));
+    const auto answer = stream.Exchange(Move(moves));
     EXPECT_THAT(answer.pairs(), ::testing::ElementsAreArray(changed));
     EXPECT_GT(changed.size(), 20U);
     EXPECT_LT(changed.size(), 1000U);
@@ -565,10 +565,11 @@ TEST_F(StreamCollisionsCall, ClientsThatWriteAheadAreAnsweredInOrder) {
 TEST_F(StreamCollisionsCall, DrainingRefusesNewStreamsAndLetsRunningOnesEnd) {
   Put("cube", Cube());
   Stream stream(*collisions_);
-  stream.Ask(Open({PlacementOf("cube"), PlacementOf("cube", 2)}, {0, 1}));
+  stream.Exchange(Open({PlacementOf("cube"), PlacementOf("cube", 2)}, {0, 1}));
   server_->BeginDrain();
   ExpectRefused({}, grpc::StatusCode::UNAVAILABLE, "shutting down");
-  EXPECT_THAT(stream.Ask(MoveX(1, 1)).columns().relations(), ElementsAre(v1::RELATION_TOUCHING));
+  EXPECT_THAT(stream.Exchange(MoveX(1, 1)).columns().relations(),
+              ElementsAre(v1::RELATION_TOUCHING));
   EXPECT_FALSE(server_->WaitIdle(std::chrono::milliseconds(0)));
   EXPECT_TRUE(stream.Finish().ok());
   EXPECT_TRUE(server_->WaitIdle(std::chrono::minutes(5)));

@@ -45,7 +45,7 @@ TEST_F(FirstPairsTest, FirstOnlyFindsThePairsThatMayTouchFirst) {
         pairs.add_pairs(b);
       }
     }
-    const auto batch = Ask(pairs);
+    const auto batch = CheckBatch(pairs);
     ASSERT_TRUE(batch.ok()) << batch.status();
     const v1::AnswerColumns& all = batch->columns();
     double earliest = std::numeric_limits<double>::infinity();

@@ -116,7 +116,7 @@ TEST_F(MovingBodies, BodiesAreAnsweredLikeTheirPieces) {
       EXPECT_LE(until, whole.first_contact().contact_time());
     }
     ++counts[whole.relation()];
-    const auto batch = Ask(Batch({a, b}, {0, 1}));
+    const auto batch = CheckBatch(Batch({a, b}, {0, 1}));
     ASSERT_TRUE(batch.ok()) << batch.status();
     EXPECT_EQ(batch->columns().relations(0), whole.relation());
     EXPECT_PRED2(is_near, batch->columns().separated_until(0), until);
@@ -194,8 +194,8 @@ TEST_F(MovingBodies, PiecesWithPosesOfTheirOwnMove) {
   const double angle = std::asin(3.5 / std::sqrt(17.0)) - std::atan2(1, 4);
   EXPECT_NEAR(turned.first_contact().contact_time(), std::tan(angle / 2), 1e-8);
 
-  const auto batch =
-      Ask(Batch({PlacementOf("body"), coming, PlacementOf("cube"), turning}, {0, 1, 1, 2, 3, 1}));
+  const auto batch = CheckBatch(
+      Batch({PlacementOf("body"), coming, PlacementOf("cube"), turning}, {0, 1, 1, 2, 3, 1}));
   ASSERT_TRUE(batch.ok()) << batch.status();
   EXPECT_EQ(batch->columns().pair_problems_size(), 0);
   EXPECT_EQ(batch->columns().contact_times(0), 0.5);

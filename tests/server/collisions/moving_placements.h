@@ -118,7 +118,7 @@ class MovingPlacements : public ServerTest {
     return scene;
   }
 
-  absl::StatusOr<v1::BatchCheckCollisionsResponse> Ask(
+  absl::StatusOr<v1::BatchCheckCollisionsResponse> CheckBatch(
       const v1::BatchCheckCollisionsRequest& request) {
     v1::BatchCheckCollisionsResponse whole;
     const absl::Status status =

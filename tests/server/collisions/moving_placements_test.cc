@@ -97,7 +97,7 @@ TEST_F(MovingPlacements, ABatchAnswersLikeSingleCalls) {
   for (uint32_t i = 4; i < placements.size(); ++i) pairs.insert(pairs.end(), {0, i});
   v1::BatchCheckCollisionsRequest request = Batch(placements, pairs);
   request.mutable_wanted()->set_certificate(true);
-  const auto batch = Ask(request);
+  const auto batch = CheckBatch(request);
   ASSERT_TRUE(batch.ok()) << batch.status();
   const v1::AnswerColumns& columns = batch->columns();
   const int rows = static_cast<int>(pairs.size()) / 2;
@@ -136,21 +136,21 @@ TEST_F(MovingPlacements, PackedMotionsAreAnsweredLikeListedOnes) {
   v1::BatchCheckCollisionsRequest packed = Batch({}, {0, 1});
   v1::PackedPlacements& list = *packed.mutable_packed_placements();
   list = PackPlacements(Batch(placements, {}).placements());
-  const auto listed = Ask(Batch(placements, {0, 1}));
-  const auto answer = Ask(packed);
+  const auto listed = CheckBatch(Batch(placements, {0, 1}));
+  const auto answer = CheckBatch(packed);
   ASSERT_TRUE(listed.ok() && answer.ok()) << listed.status() << answer.status();
   EXPECT_THAT(answer->columns().contact_times(), ElementsAre(0.5));
   EXPECT_EQ(answer->columns().ShortDebugString(), listed->columns().ShortDebugString());
 
   list.mutable_end_poses()->RemoveLast();
-  EXPECT_THAT(Ask(packed).status().message(),
+  EXPECT_THAT(CheckBatch(packed).status().message(),
               HasSubstr("packed_placements.end_poses has 13 numbers for 2 placements"));
 }
 
 TEST_F(MovingPlacements, AnswersAtRestHaveNoTimes) {
   Put("cube", Cube());
   EXPECT_FALSE(Check(Pair(PlacementOf("cube"), PlacementOf("cube"))).has_first_contact());
-  const auto batch = Ask(Batch({PlacementOf("cube"), PlacementOf("cube")}, {0, 1}));
+  const auto batch = CheckBatch(Batch({PlacementOf("cube"), PlacementOf("cube")}, {0, 1}));
   ASSERT_TRUE(batch.ok()) << batch.status();
   EXPECT_TRUE(batch->columns().separated_until().empty());
   EXPECT_TRUE(batch->columns().contact_times().empty());
@@ -175,7 +175,7 @@ TEST_F(MovingPlacements, TheColumnsOfASceneAreThoseOfABatch) {
       pairs.add_pairs(b);
     }
   }
-  const auto batch = Ask(pairs);
+  const auto batch = CheckBatch(pairs);
   ASSERT_TRUE(batch.ok()) << batch.status();
   const auto found = Find(request);
   ASSERT_TRUE(found.ok()) << found.status();
@@ -203,7 +203,7 @@ TEST_F(MovingPlacements, MalformedEndPosesAreRefusedByName) {
   const auto expect = [&](const v1::Placement& bad, const std::string& message) {
     ExpectRefused(Pair(bad, cube), absl::StrCat("a.end_pose.", message));
     ExpectRefused(Pair(cube, bad), absl::StrCat("b.end_pose.", message));
-    const auto batch = Ask(Batch({cube, bad}, {0, 1}));
+    const auto batch = CheckBatch(Batch({cube, bad}, {0, 1}));
     ASSERT_TRUE(batch.ok()) << batch.status();
     ASSERT_EQ(batch->placement_problems_size(), 1);
     EXPECT_EQ(batch->placement_problems(0).placement(), 1u);
@@ -248,7 +248,7 @@ TEST_F(MovingPlacements, OptionsThatMotionsExcludeAreRefusedByName) {
     batch.set_method(request.method());
     batch.set_tolerance(request.tolerance());
     *batch.mutable_wanted() = request.wanted();
-    EXPECT_THAT(MessageOf(Ask(batch).status()),
+    EXPECT_THAT(MessageOf(CheckBatch(batch).status()),
                 StartsWith(absl::StrCat(name, " cannot be combined")));
     if (request.method() != v1::METHOD_UNSPECIFIED) continue;
     v1::FindCollisionsRequest scene;

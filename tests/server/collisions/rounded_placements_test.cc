@@ -173,7 +173,7 @@ TEST_F(RoundedPlacements, RadiiOfBodiesAddToThoseOfTheirPieces) {
   EXPECT_EQ(body->pieces(1).radius(), 0.25);
 }
 
-TEST_F(RoundedPlacements, EveryCallDecidesAlike) {
+TEST_F(RoundedPlacements, EveryCallReturnsTheSameRelation) {
   PutRow();
   v1::FindCollisionsRequest scene;
   for (int i = 0; i < 60; ++i) {

@@ -72,7 +72,7 @@ class Watch {
     return texts;
   }
 
-  void SayAll() { stream_->WritesDone(); }
+  void HalfClose() { stream_->WritesDone(); }
   grpc::Status Finish() {
     v1::WatchCollisionsResponse message;
     while (stream_->Read(&message)) {
@@ -144,7 +144,7 @@ TEST_F(WatchCollisions, ReportsCollisionsAndChangesByMotion) {
     const v1::WatchCollisionsResponse last = watch.Round();
     EXPECT_EQ(last.events_size(), 0);
     EXPECT_EQ(last.update(), 5);
-    watch.SayAll();
+    watch.HalfClose();
     EXPECT_TRUE(watch.Finish().ok());
   }
 }
@@ -463,8 +463,8 @@ TEST_F(WatchCollisions, EachEventIsExactAtItsRevisions) {
         const v1::Relation now =
             truth.Relate(ids[a], Get(ids[a]).hull().revision(), poses.back()[a], ids[b],
                          Get(ids[b]).hull().revision(), poses.back()[b]);
-        const auto told = known.find({a, b});
-        EXPECT_EQ(told == known.end() ? v1::RELATION_SEPARATED : told->second, now)
+        const auto reported = known.find({a, b});
+        EXPECT_EQ(reported == known.end() ? v1::RELATION_SEPARATED : reported->second, now)
             << a << " " << b;
       }
     }

@@ -292,17 +292,17 @@ class MixedClient {
       truth.push_back(Truth(a, request.placements(static_cast<int>(2 * i)), b,
                             request.placements(static_cast<int>(2 * i + 1))));
     }
-    std::vector<v1::Relation> told;
+    std::vector<v1::Relation> answered;
     const absl::Status status = client_.BatchCheckCollisions(
-        request, [&told](const v1::BatchCheckCollisionsResponse& part) {
+        request, [&answered](const v1::BatchCheckCollisionsResponse& part) {
           for (const int relation : part.columns().relations()) {
-            told.push_back(static_cast<v1::Relation>(relation));
+            answered.push_back(static_cast<v1::Relation>(relation));
           }
           return absl::OkStatus();
         });
     tally_.Count("batch", status);
     if (status.ok()) {
-      EXPECT_EQ(told, truth) << request.ShortDebugString();
+      EXPECT_EQ(answered, truth) << request.ShortDebugString();
     }
   }
   void Scene() {
@@ -314,11 +314,12 @@ class MixedClient {
       placed.push_back(present[Below(present.size())]);
       *request.add_placements() = Place(placed.back()->hull_id());
     }
-    std::map<std::pair<uint32_t, uint32_t>, int> told;
+    std::map<std::pair<uint32_t, uint32_t>, int> answered;
     const absl::Status status =
-        client_.FindCollisions(request, [&told](const v1::FindCollisionsResponse& part) {
+        client_.FindCollisions(request, [&answered](const v1::FindCollisionsResponse& part) {
           for (int i = 0; i + 1 < part.pairs_size(); i += 2) {
-            told[std::minmax(part.pairs(i), part.pairs(i + 1))] = part.columns().relations(i / 2);
+            answered[std::minmax(part.pairs(i), part.pairs(i + 1))] =
+                part.columns().relations(i / 2);
           }
           return absl::OkStatus();
         });
@@ -326,8 +327,8 @@ class MixedClient {
     if (!status.ok()) return;
     for (uint32_t a = 0; a < placed.size(); ++a) {
       for (uint32_t b = a + 1; b < placed.size(); ++b) {
-        const auto pair = told.find({a, b});
-        EXPECT_EQ(pair == told.end() ? static_cast<int>(v1::RELATION_SEPARATED) : pair->second,
+        const auto pair = answered.find({a, b});
+        EXPECT_EQ(pair == answered.end() ? static_cast<int>(v1::RELATION_SEPARATED) : pair->second,
                   Truth(*placed[a], request.placements(static_cast<int>(a)), *placed[b],
                         request.placements(static_cast<int>(b))));
       }

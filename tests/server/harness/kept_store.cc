@@ -70,7 +70,7 @@ class KeptPostgres : public KeptStore {
 
   std::string Get(const std::string& key) override {
     const Place place = PlaceOf(key);
-    const std::vector<std::string> rows = Ask(absl::StrCat(
+    const std::vector<std::string> rows = RunSql(absl::StrCat(
         "SELECT encode(", place.column, ", 'hex') FROM hulld.", place.table, place.where));
     HULLD_CHECK(rows.size() == 1);
     return absl::HexStringToBytes(rows.front());
@@ -85,9 +85,9 @@ class KeptPostgres : public KeptStore {
     Change(absl::StrCat("DELETE FROM hulld.", place.table, place.where));
   }
   size_t Count(char prefix) override {
-    return std::stoull(
-        Ask(absl::StrCat("SELECT count(*) FROM hulld.", PlaceOf(IncarnationKey(prefix, 0)).table))
-            .front());
+    return std::stoull(RunSql(absl::StrCat("SELECT count(*) FROM hulld.",
+                                           PlaceOf(IncarnationKey(prefix, 0)).table))
+                           .front());
   }
   void SetFormat(uint64_t format) override {
     Change(absl::StrCat("UPDATE hulld.store SET format = ", format));
@@ -130,11 +130,13 @@ class KeptPostgres : public KeptStore {
     }
   }
 
-  std::vector<std::string> Ask(const std::string& sql) const {
-    return PostgresCluster::Shared().Ask(database_, sql);
+  std::vector<std::string> RunSql(const std::string& sql) const {
+    return PostgresCluster::Shared().RunSql(database_, sql);
   }
   // Requires: the statement changes exactly one row.
-  void Change(const std::string& sql) const { HULLD_CHECK(Ask(sql + " RETURNING 1").size() == 1); }
+  void Change(const std::string& sql) const {
+    HULLD_CHECK(RunSql(sql + " RETURNING 1").size() == 1);
+  }
 
   const std::string database_ = PostgresCluster::Shared().MakeDatabase();
 };

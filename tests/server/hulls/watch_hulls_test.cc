@@ -435,15 +435,15 @@ void ExpectTrue(const Moments& moments, const Writer::History& histories) {
       auto next = history.upper_bound(revision);
       const auto at =
           next == history.begin() ? std::pair<uint64_t, uint64_t>() : std::prev(next)->second;
-      const auto told = state.find(id);
-      const auto told_state = told == state.end() ? decltype(at)() : told->second;
+      const auto found = state.find(id);
+      const auto reported = found == state.end() ? decltype(at)() : found->second;
       if (next == history.end()) {
-        ASSERT_EQ(told_state, at) << id << " at " << revision;
+        ASSERT_EQ(reported, at) << id << " at " << revision;
         continue;
       }
       // Superseded: a state that existed, no older than the last one reported.
-      bool was_there = told_state.first == 0;
-      for (const auto& [changed_at, after] : history) was_there = was_there || after == told_state;
+      bool was_there = reported.first == 0;
+      for (const auto& [changed_at, after] : history) was_there = was_there || after == reported;
       ASSERT_TRUE(was_there) << id << " at " << revision;
     }
   }

@@ -82,7 +82,7 @@ std::string Open(uint32_t stream) {
 // The bytes that one connection sends repeatedly, by index, and the maximum number of repetitions.
 struct Attack {
   const char* name;
-  int most;
+  int max;
   std::function<std::string(uint32_t i)> bytes;
 };
 
@@ -132,7 +132,7 @@ void RunAttack(const Attack& attack, const std::string& address) {
   Attacker attacker(address);
   ASSERT_TRUE(attacker.connected());
   bool open = std::string(attack.name) == "NotHttp2" || attacker.Send(kOpening);
-  for (uint32_t i = 0; open && i < static_cast<uint32_t>(attack.most); ++i) {
+  for (uint32_t i = 0; open && i < static_cast<uint32_t>(attack.max); ++i) {
     open = attacker.Send(attack.bytes(i));
   }
   attacker.AwaitEnd();

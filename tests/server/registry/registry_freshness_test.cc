@@ -47,7 +47,7 @@ class SharedStore : public MemoryStore, public PeerFeed {
   }
   absl::Status Fetch() override {
     std::unique_lock lock(mutex_);
-    ++asked_;
+    ++query_count_;
     changed_.notify_all();
     // The answer may lack changes committed while the request is in flight.
     PeerChanges found = std::exchange(committed_, {});
@@ -83,13 +83,13 @@ class SharedStore : public MemoryStore, public PeerFeed {
     const std::lock_guard lock(mutex_);
     failure_ = std::move(failure);
   }
-  int asked() {
+  int query_count() {
     const std::lock_guard lock(mutex_);
-    return asked_;
+    return query_count_;
   }
   void AwaitQuery(int number) {
     std::unique_lock lock(mutex_);
-    changed_.wait(lock, [&] { return asked_ >= number; });
+    changed_.wait(lock, [&] { return query_count_ >= number; });
   }
 
  private:
@@ -101,7 +101,7 @@ class SharedStore : public MemoryStore, public PeerFeed {
 
   std::mutex mutex_;
   std::condition_variable changed_;
-  int asked_ = 0;
+  int query_count_ = 0;
   bool is_held_ = false;
   absl::Status failure_;
   PeerChanges committed_;
@@ -150,18 +150,18 @@ class RegistryFreshnessTest : public ::testing::Test {
 TEST_F(RegistryFreshnessTest, ALinearizableReadSeesPeerChanges) {
   store_.CreateElsewhere("h", 1);
   EXPECT_FALSE(IsAnsweredAtOnce("h", {}));
-  const int before = store_.asked();
+  const int before = store_.query_count();
   const auto read = Read("h", {});
   ASSERT_TRUE(read.ok()) << read.status();
   EXPECT_EQ(read->revision, 1);
   EXPECT_EQ(read->staleness, nanoseconds(0));
-  EXPECT_EQ(store_.asked(), before + 1);
+  EXPECT_EQ(store_.query_count(), before + 1);
 }
 
 TEST_F(RegistryFreshnessTest, AReadWithinItsBoundIsAnsweredAtOnceWithItsStaleness) {
   ASSERT_TRUE(hulls_.Create("h").ok());
   store_.CreateElsewhere("i", 2);
-  const int before = store_.asked();
+  const int before = store_.query_count();
   store_.Hold();
   const auto read = Read("h", AtMost(hours(1)));
   ASSERT_TRUE(read.ok()) << read.status();
@@ -173,7 +173,7 @@ TEST_F(RegistryFreshnessTest, AReadWithinItsBoundIsAnsweredAtOnceWithItsStalenes
   const auto later = Read("h", AtMost(hours(1), minutes(20)));
   ASSERT_TRUE(later.ok());
   EXPECT_GE(later->staleness, minutes(20));
-  EXPECT_EQ(store_.asked(), before);
+  EXPECT_EQ(store_.query_count(), before);
 }
 
 TEST_F(RegistryFreshnessTest, AReadBeyondItsBoundQueriesTheStore) {
@@ -181,17 +181,17 @@ TEST_F(RegistryFreshnessTest, AReadBeyondItsBoundQueriesTheStore) {
   const Freshness freshness = AtMost(hours(1), hours(2));
   EXPECT_FALSE(IsAnsweredAtOnce("h", freshness));
   EXPECT_FALSE(registry_.peers().TryFresh(freshness).has_value());
-  const int before = store_.asked();
+  const int before = store_.query_count();
   const auto read = Read("h", freshness);
   ASSERT_TRUE(read.ok()) << read.status();
   EXPECT_EQ(read->revision, 1);
   EXPECT_EQ(read->staleness, nanoseconds(0));
-  EXPECT_EQ(store_.asked(), before + 1);
+  EXPECT_EQ(store_.query_count(), before + 1);
 }
 
 TEST_F(RegistryFreshnessTest, AHalfExpiredBoundQueriesTheStoreOnceForLaterReads) {
   ASSERT_TRUE(hulls_.Create("h").ok());
-  const int before = store_.asked();
+  const int before = store_.query_count();
   store_.Hold();
   for (int i = 0; i < 3; ++i) {
     const auto read = Read("h", AtMost(hours(1), minutes(40)));
@@ -202,12 +202,12 @@ TEST_F(RegistryFreshnessTest, AHalfExpiredBoundQueriesTheStoreOnceForLaterReads)
   store_.Release();
   // A read that joined the request of earlier reads: no other request was sent in between.
   ASSERT_TRUE(registry_.peers().AwaitPeers({}).ok());
-  EXPECT_EQ(store_.asked(), before + 2);
+  EXPECT_EQ(store_.query_count(), before + 2);
 }
 
 TEST_F(RegistryFreshnessTest, ABoundIsMeasuredFromTheQueryAndNotFromItsAnswer) {
   store_.Hold();
-  const int before = store_.asked();
+  const int before = store_.query_count();
   auto first = ReadElsewhere("h", {});
   store_.AwaitQuery(before + 1);
   // Acknowledged before the second read begins, after the request was sent.
@@ -219,22 +219,22 @@ TEST_F(RegistryFreshnessTest, ABoundIsMeasuredFromTheQueryAndNotFromItsAnswer) {
   const auto second = Read("h", after_the_query);
   ASSERT_TRUE(second.ok()) << second.status();
   EXPECT_EQ(second->revision, 1);
-  EXPECT_EQ(store_.asked(), before + 2);
+  EXPECT_EQ(store_.query_count(), before + 2);
 }
 
 TEST_F(RegistryFreshnessTest, ALinearizableReadThatBeganBeforeAQueryNeedsNoOther) {
   Freshness began_before;
   began_before.began = SteadyClock::now();
   ASSERT_TRUE(registry_.peers().AwaitPeers({}).ok());
-  const int before = store_.asked();
+  const int before = store_.query_count();
   EXPECT_TRUE(IsAnsweredAtOnce("h", began_before));
   EXPECT_TRUE(absl::IsNotFound(Read("h", began_before).status()));
-  EXPECT_EQ(store_.asked(), before);
+  EXPECT_EQ(store_.query_count(), before);
 }
 
 TEST_F(RegistryFreshnessTest, AnAppliedRevisionIsAnsweredHoweverOld) {
   ASSERT_TRUE(hulls_.Create("h").ok());
-  const int before = store_.asked();
+  const int before = store_.query_count();
   store_.Hold();
   Freshness freshness = AtLeast(1);
   freshness.began = SteadyClock::now() + hours(1000);
@@ -243,14 +243,14 @@ TEST_F(RegistryFreshnessTest, AnAppliedRevisionIsAnsweredHoweverOld) {
   ASSERT_TRUE(read.ok());
   EXPECT_EQ(read->revision, 1);
   EXPECT_GE(read->staleness, hours(1000));
-  EXPECT_EQ(store_.asked(), before);
+  EXPECT_EQ(store_.query_count(), before);
 }
 
 TEST_F(RegistryFreshnessTest, AnUnappliedRevisionIsAwaited) {
   store_.CreateElsewhere("h", 7);
   ASSERT_FALSE(IsAnsweredAtOnce("h", AtLeast(7)));
   store_.Hold();
-  const int before = store_.asked();
+  const int before = store_.query_count();
   auto read = ReadElsewhere("h", AtLeast(7));
   store_.AwaitQuery(before + 1);
   store_.Release();

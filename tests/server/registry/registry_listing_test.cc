@@ -1,4 +1,4 @@
-// Lists over a store that finds records: every later read agrees with a list.
+// Lists over a store that supports record lookup: every later read agrees with a list.
 #include <absl/status/status.h>
 #include <gtest/gtest.h>
 
@@ -18,7 +18,7 @@ namespace registry_listing_test {
 class ListedStore : public MemoryStore {
  public:
   bool keeps_hulls() const override { return true; }
-  bool finds_records() const override { return true; }
+  bool supports_lookup() const override { return true; }
   absl::Status Commit(std::span<Change* const> changes) override {
     std::unique_lock lock(mutex_);
     const absl::Status committed = MemoryStore::Commit(changes);

@@ -80,9 +80,9 @@ TEST_F(RegistryLookup, ChangesBetweenTwoSlicesAreLookedUpAgain) {
     }
     return false;
   };
-  std::vector<std::string> asked = ids;
-  asked.push_back("new");
-  const absl::StatusOr<Resolved> resolved = registry_.Resolve(asked, change);
+  std::vector<std::string> requested = ids;
+  requested.push_back("new");
+  const absl::StatusOr<Resolved> resolved = registry_.Resolve(requested, change);
   ASSERT_TRUE(resolved.ok());
   EXPECT_GE(round, 5);
   for (size_t i = 0; i < ids.size(); i += 100) EXPECT_EQ(Received(*resolved, i), 5);

@@ -243,10 +243,10 @@ TEST(RegistryOfMemoryStore, WaitingPointsCount) {
   const uint64_t line_bytes = line.size() * sizeof(Vector);
   const std::vector<Vector> waiting(3000, Vector(1, 2, 3));
   std::promise<absl::StatusOr<ChunkResult>> next;
-  bool asked = false;
+  bool was_polled = false;
   // While the first chunk is built.
   const auto should_stop = [&] {
-    if (std::exchange(asked, true)) return false;
+    if (std::exchange(was_polled, true)) return false;
     const uint64_t before = registry.Cache().bytes;
     EXPECT_EQ(before, line_bytes);
     registry.changes().Append(
@@ -260,7 +260,7 @@ TEST(RegistryOfMemoryStore, WaitingPointsCount) {
                               std::move(done));
   });
   EXPECT_TRUE(first.ok());
-  EXPECT_TRUE(asked);
+  EXPECT_TRUE(was_polled);
   EXPECT_TRUE(next.get_future().get().ok());
   // Only the builder, with the points that became vertices, remains.
   HullBuilder builder;

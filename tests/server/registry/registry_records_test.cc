@@ -1,5 +1,5 @@
-// Requests of a registry to a store that finds records: none at the start, and one per record while
-// it is cached.
+// Requests of a registry to a store that supports record lookup: none at the start, and one per
+// record while it is cached.
 #include <absl/strings/str_cat.h>
 #include <gtest/gtest.h>
 
@@ -23,7 +23,7 @@ class VastStore : public MemoryStore {
   static constexpr uint64_t kBodies = uint64_t{1} << 39;
 
   bool keeps_hulls() const override { return true; }
-  bool finds_records() const override { return true; }
+  bool supports_lookup() const override { return true; }
   uint64_t revision() const override { return kHulls; }
   StoreTotals totals() const override { return {kHulls, 0, kBodies}; }
   absl::Status ForEachHull(const StoredHullVisitor&) override {
@@ -48,14 +48,14 @@ class VastStore : public MemoryStore {
   }
   // Returns at most eight, even if more are requested.
   absl::StatusOr<FoundRecords> ListRecords(const std::string& prefix, const std::string& after,
-                                           size_t most, RecordKinds kinds) override {
+                                           size_t limit, RecordKinds kinds) override {
     EXPECT_TRUE(kinds.bodies && !kinds.hulls);
     ++queries;
     FoundRecords found;
     found.revision = kHulls;
     found.more = true;
     const uint64_t first = after.empty() ? 10 : std::stoull(after.substr(1)) + 1;
-    for (uint64_t i = 0; i < std::min<uint64_t>(most, 8); ++i) {
+    for (uint64_t i = 0; i < std::min<uint64_t>(limit, 8); ++i) {
       const std::string id = absl::StrCat(prefix, first + i);
       found.bodies.emplace(id, BodyOf(id));
     }
@@ -86,8 +86,8 @@ class VastStore : public MemoryStore {
 
 class RegistryRecords : public ::testing::Test {
  protected:
-  void Start(size_t most) {
-    registry_.KeepRecords(most);
+  void Start(size_t limit) {
+    registry_.SetRecordCapacity(limit);
     ASSERT_TRUE(registry_.Load().ok());
   }
   static std::vector<std::string> Ids(uint64_t first, uint64_t count, const char* kind = "h") {
@@ -123,7 +123,7 @@ class RegistryRecords : public ::testing::Test {
   Registry registry_{store_, limits_, writers_};
 };
 
-TEST_F(RegistryRecords, TheStartReadsNothing) {
+TEST_F(RegistryRecords, StartupReadsNoRecords) {
   Start(1000);
   EXPECT_EQ(store_.queries, 0);
   EXPECT_EQ(registry_.Sizes().hull_count, VastStore::kHulls);
@@ -175,7 +175,7 @@ TEST_F(RegistryRecords, TheCacheStaysWithinItsLimit) {
 }
 
 // A call may name more records than the cache holds.
-TEST_F(RegistryRecords, ACallMayNameMoreThanAreKept) {
+TEST_F(RegistryRecords, ACallMayNameMoreRecordsThanTheCacheHolds) {
   Start(10);
   ExpectThere(Ids(0, 3000));
 }
@@ -236,7 +236,7 @@ TEST_F(RegistryRecords, ABodyInUseStaysCached) {
   EXPECT_EQ(registry_.records().FindBodies(ids).bodies.front(), held.bodies.front());
 }
 
-TEST_F(RegistryRecords, ACallMayNameMoreBodiesThanAreKept) {
+TEST_F(RegistryRecords, ACallMayNameMoreBodiesThanTheCacheHolds) {
   Start(10);
   ExpectBodies(Ids(0, 3000, "b"));
 }

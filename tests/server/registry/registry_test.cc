@@ -226,9 +226,9 @@ TEST_F(RegistryTest, TheCanonicalSnapshotIsMadeOnceAndOnDemand) {
 TEST_F(RegistryTest, AReaderThatWaitsForTheCanonicalSnapshotCanBeCancelled) {
   ASSERT_TRUE(Append(Open("h"), 1, Paraboloid()).ok());
   const HullView view = registry_.Resolve("h", {})->second;
-  bool asked = false;
+  bool was_polled = false;
   const auto made = registry_.reader().Canonical(view, [&] {
-    if (!std::exchange(asked, true)) {
+    if (!std::exchange(was_polled, true)) {
       std::thread([&] {
         EXPECT_TRUE(
             absl::IsCancelled(registry_.reader().Canonical(view, [] { return true; }).status()));
@@ -237,7 +237,7 @@ TEST_F(RegistryTest, AReaderThatWaitsForTheCanonicalSnapshotCanBeCancelled) {
     return false;
   });
   EXPECT_TRUE(made.ok());
-  EXPECT_TRUE(asked);
+  EXPECT_TRUE(was_polled);
 }
 
 // The hull replaced the version long ago, and later preparations contain later points.
@@ -280,7 +280,7 @@ TEST_F(RegistryTest, PreparationPrecedesOnlyWaitingQueries) {
 }
 
 // Each chunk covers all earlier points. No reader queries it.
-TEST_F(RegistryTest, FormerVerticesLeaveMemory) {
+TEST_F(RegistryTest, ReplacedVerticesAreFreed) {
   constexpr int kVertices = 100;
   constexpr uint64_t kChunks = 1000;
   const AppendSession session = Open("h");
@@ -317,9 +317,9 @@ TEST_F(RegistryTest, ADeletionWaitsForTheChunkInProgressAndRefusesTheNext) {
   for (int i = 0; i < 20'000; ++i) points.emplace_back(i, 0, 0);
   std::promise<absl::StatusOr<uint64_t>> deleted;
   std::promise<absl::StatusOr<ChunkResult>> next;
-  bool asked = false;
+  bool was_polled = false;
   const auto result = Append(session, 1, std::move(points), [&] {
-    if (!std::exchange(asked, true)) {
+    if (!std::exchange(was_polled, true)) {
       registry_.changes().Delete("hull", "h", std::nullopt,
                                  [&](absl::StatusOr<uint64_t> reply) { deleted.set_value(reply); });
       registry_.changes().Append(session, {2, {{0, 1, 0}}, std::nullopt}, {}, {},

@@ -251,16 +251,16 @@ void Client::List() {
 
 // Waits for freshness as a call without a thread does. Returns true if the registry reported it.
 bool Client::AwaitFresh(const Freshness& freshness) {
-  const auto told = std::make_shared<Event>();
+  const auto notified = std::make_shared<Event>();
   const auto fresh = std::make_shared<absl::Status>();
   PeerSync& peers = simulation_.registry.peers();
   if (peers.TryFresh(freshness).has_value()) return false;
   peers.StartFetch([=](const absl::Status& status) {
-    if (told->is_set()) Scheduler::Current().Fail("a reader is notified twice");
+    if (notified->is_set()) Scheduler::Current().Fail("a reader is notified twice");
     *fresh = status;
-    told->Set();
+    notified->Set();
   });
-  told->Wait();
+  notified->Wait();
   return fresh->ok();
 }
 

@@ -13,7 +13,7 @@ namespace hulld::server {
 namespace mutant_test {
 
 constexpr uint64_t kMax = 300'000;
-// **Observed**: the rarest defect, AListIsOfALaterMoment, is found within the first 33,235
+// **Observed**: the rarest defect, ListIsAheadOfRegistry, is found within the first 33,235
 // schedules.
 constexpr uint64_t kFirstSeed = 1'000'001;
 

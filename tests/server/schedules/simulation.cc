@@ -112,7 +112,7 @@ void SimulateServers(const Plan& plan, SimulatedStore& database, Reached& reache
     SharedStore store(database);
     TaskPool writers(2);
     Registry registry(store, limits, writers);
-    if (plan.finds_records) registry.KeepRecords(plan.records);
+    if (plan.supports_lookup) registry.SetRecordCapacity(plan.records);
     if (!registry.Load().ok())
       Scheduler::Current().Fail("the contents of the database cannot be loaded");
     Simulation simulation{plan, database, registry, reached};
@@ -174,7 +174,7 @@ Plan::Plan(Random& random) {
   cancellations = rarely(2);
   preparations = random.OneIn(2) ? 0 : rarely(1);
   repetitions = rarely(2);
-  finds_records = random.OneIn(2);
+  supports_lookup = random.OneIn(2);
   records = random.Below(3);
   bodies = random.OneIn(2) ? 1 + weight() : 0;
   if (random.OneIn(16)) {
@@ -193,13 +193,13 @@ Plan::Plan(Random& random) {
   has_watch = has_collision_watch = false;
   faults.damage = 0;
   faults.killed_at_batch = 0;
-  if (!finds_records) bodies = 0;
+  if (!supports_lookup) bodies = 0;
 }
 
 void Simulate(Reached& reached) {
   const Plan plan(Scheduler::Current().random());
   SimulatedStore store(plan.faults);
-  store.SetFindsRecords(plan.finds_records);
+  store.SetFindsRecords(plan.supports_lookup);
   if (plan.servers > 1) {
     SimulateServers(plan, store, reached);
     return CountStore(store.counts(), reached);
@@ -209,7 +209,7 @@ void Simulate(Reached& reached) {
   const auto run = [&](const auto& body) {
     TaskPool writers(2);
     Registry registry(store, limits, writers);
-    if (plan.finds_records) registry.KeepRecords(plan.records);
+    if (plan.supports_lookup) registry.SetRecordCapacity(plan.records);
     if (!registry.Load().ok())
       Scheduler::Current().Fail("the contents of the store cannot be loaded");
     Simulation simulation{plan, store, registry, reached};

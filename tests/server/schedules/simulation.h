@@ -66,8 +66,8 @@ struct Plan {
   uint64_t memory_limit = 0;
   // If true, the memory limit is reached under pressure only.
   bool has_memory = false;
-  // True if the store finds records; and the number of records that a server keeps.
-  bool finds_records = false;
+  // True if the store supports record lookup; and the number of records that a server keeps.
+  bool supports_lookup = false;
   size_t records = 0;
   // Servers over one database, and the clients of each.
   size_t servers = 1;

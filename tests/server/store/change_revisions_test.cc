@@ -57,7 +57,7 @@ TEST(NumberChanges, ChunksOfOneHullBuildOnEachOther) {
       EXPECT_EQ(changes[i].revision, revisions[i]);
       EXPECT_EQ(changes[i].hull.record.revision, revisions[i]);
       EXPECT_EQ(changes[i].hull.layout.base_revision, revision + 1);
-      EXPECT_EQ(changes[i].former_layout.base_revision, i == 0 ? 2 : revision + 1);
+      EXPECT_EQ(changes[i].previous_layout.base_revision, i == 0 ? 2 : revision + 1);
     }
   }
   EXPECT_EQ(before->change, 4);

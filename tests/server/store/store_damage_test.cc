@@ -190,7 +190,7 @@ TEST_F(RocksDbDamage, KeysOfAnotherDamagedHullAreKeptUntilItIsDeletedToo) {
   EXPECT_EQ(hulls_->View("c")->record.vertex_count, 8);
 }
 
-TEST_F(RocksDbDamage, TheDoctorsReportIsUtf8ForAnyKeys) {
+TEST_F(RocksDbDamage, DoctorReportIsUtf8ForAnyKeys) {
   FillThree();
   ASSERT_TRUE(hulls_->store().db().Put({}, HullKey("x\xff\"\n"), "garbage").ok());
   hulls_ = nullptr;

@@ -326,7 +326,7 @@ TEST_F(StoreFault, AFailedFirstChangeKeepsTheStoreId) {
   EXPECT_EQ(hulls_->View("h")->record.vertex_count, 8);
 }
 
-TEST_F(StoreFault, AFileNamedLikeOurProbeOutlivesARepair) {
+TEST_F(StoreFault, RecoveryKeepsAFileNamedLikeItsProbe) {
   Start();
   const std::string path = directory_ + "/data/probe";
   std::ofstream(path) << "mine";
@@ -359,7 +359,7 @@ TEST_F(StoreFault, AnUnreadableStoreIsNotCopied) {
   EXPECT_EQ(directories(), before);
 }
 
-// Its former revisions may be assigned to other changes.
+// Its lost revisions may be assigned to other changes.
 TEST_F(StoreFault, ARelaxedStoreGetsANewIdAfterAnOutage) {
   durability_ = Durability::kRelaxed;
   sync_interval_ = std::chrono::hours(1);
@@ -491,17 +491,17 @@ TEST_F(StoreFault, NoAckPrecedesItsSync) {
     if (!store.ok()) break;
     DurableRegistry survivors(*std::move(store));
     EXPECT_TRUE(survivors.loaded().ok());
-    for (const auto& [id, told] : acked) {
+    for (const auto& [id, ack] : acked) {
       const auto view = survivors.View(id);
       EXPECT_TRUE(view.ok()) << view.status();
       if (!view.ok()) continue;
-      EXPECT_GE(survivors.Open(id)->last_sequence, told.sequence);
-      EXPECT_GE(view->record.revision, told.revision);
+      EXPECT_GE(survivors.Open(id)->last_sequence, ack.sequence);
+      EXPECT_GE(view->record.revision, ack.revision);
       EXPECT_GE(view->record.revision, last_revision[id]);
-      EXPECT_GE(view->record.counts.received, told.received);
+      EXPECT_GE(view->record.counts.received, ack.received);
       EXPECT_TRUE(AuditHull(CanonicalOf(*view)).ok());
-      last_revision[id] = told.revision;
-      chunks = std::max(chunks, told.sequence);
+      last_revision[id] = ack.revision;
+      chunks = std::max(chunks, ack.sequence);
     }
   }
   ending = true;

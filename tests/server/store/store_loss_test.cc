@@ -99,14 +99,14 @@ class StoreLoss : public StoreTest {
     ::testing::internal::CaptureStdout();
     ::testing::internal::CaptureStderr();
     const int status = RunDoctor(arguments);
-    doctor_says_ = ::testing::internal::GetCapturedStdout();
-    doctor_says_ += ::testing::internal::GetCapturedStderr();
+    doctor_output_ = ::testing::internal::GetCapturedStdout();
+    doctor_output_ += ::testing::internal::GetCapturedStderr();
     return status;
   }
 
   std::string store_id_;
   uint64_t revision_ = 0;
-  std::string doctor_says_;
+  std::string doctor_output_;
 };
 
 TEST_F(StoreLoss, AnIntactStoreIsAccepted) {
@@ -119,7 +119,7 @@ TEST_F(StoreLoss, AnIntactStoreIsAccepted) {
     EXPECT_EQ((*store)->revision(), revision_);
   }
   EXPECT_EQ(Doctor({"--accept-loss"}), 0);
-  EXPECT_THAT(doctor_says_, HasSubstr(store_id_));
+  EXPECT_THAT(doctor_output_, HasSubstr(store_id_));
 }
 
 TEST_F(StoreLoss, ALogTruncatedWithinARecordIsRefused) {

@@ -225,7 +225,7 @@ TEST_P(StoreRecovery, ChangesThatWaitTogetherAreCommittedTogether) {
   EXPECT_LT(hulls.registry().Commits().batches, kHulls);
 }
 
-TEST_F(RocksDbRecovery, AStartRemovesOnlyItsOwnOldCopies) {
+TEST_F(RocksDbRecovery, StartupRemovesOnlyOldCopies) {
   Start();
   const absl::StatusOr<std::string> copy = hulls_->store().MakeCopy();
   ASSERT_TRUE(copy.ok()) << copy.status();

@@ -87,18 +87,19 @@ TEST(EncodeCertificate, PairsCarryTheirVertices) {
 
 TEST(AnswerColumns, EachColumnHoldsAnEntryPerPair) {
   const Hull hull = Tetrahedron();
-  const QueryHull asked(hull);
+  const QueryHull query_hull(hull);
   const v1::Wanted wanted = Everything();
   Answer bare;
   bare.relation = Relation::kSeparated;
   bare.separation = Separation{kInfinity, kInfinity};
   bare.within_clearance = false;
   v1::AnswerColumns columns;
-  size_t bytes = AddAnswer(absl::StatusOr<Answer>(FullAnswer()), asked, asked, wanted, &columns);
+  size_t bytes =
+      AddAnswer(absl::StatusOr<Answer>(FullAnswer()), query_hull, query_hull, wanted, &columns);
   bytes += AddUnanswered(wanted, &columns);
-  bytes += AddAnswer(absl::StatusOr<Answer>(bare), asked, asked, wanted, &columns);
-  bytes += AddAnswer(absl::StatusOr<Answer>(absl::ResourceExhaustedError("why")), asked, asked,
-                     wanted, &columns);
+  bytes += AddAnswer(absl::StatusOr<Answer>(bare), query_hull, query_hull, wanted, &columns);
+  bytes += AddAnswer(absl::StatusOr<Answer>(absl::ResourceExhaustedError("why")), query_hull,
+                     query_hull, wanted, &columns);
   EXPECT_GE(bytes, columns.ByteSizeLong() - 64);
   EXPECT_THAT(columns.relations(), ElementsAre(v1::RELATION_OVERLAPPING, v1::RELATION_UNSPECIFIED,
                                                v1::RELATION_SEPARATED, v1::RELATION_UNSPECIFIED));
@@ -135,9 +136,9 @@ TEST(AnswerColumns, EachColumnHoldsAnEntryPerPair) {
 // Then hulls without a canonical snapshot suffice.
 TEST(AnswerColumns, UnrequestedColumnsAreNotSent) {
   const LiveHull live({{0, 0, 0}, {0, 0, 4}, {0, 4, 0}, {4, 0, 0}}, 3);
-  const std::shared_ptr<const QueryHull> asked = live.VersionAt(live.Now());
+  const std::shared_ptr<const QueryHull> query_hull = live.VersionAt(live.Now());
   v1::AnswerColumns columns;
-  AddAnswer(absl::StatusOr<Answer>(FullAnswer()), *asked, *asked, v1::Wanted(), &columns);
+  AddAnswer(absl::StatusOr<Answer>(FullAnswer()), *query_hull, *query_hull, v1::Wanted(), &columns);
   AddUnanswered(v1::Wanted(), &columns);
   v1::AnswerColumns expected;
   expected.add_relations(v1::RELATION_OVERLAPPING);

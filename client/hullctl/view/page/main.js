@@ -228,8 +228,8 @@ class Viewer {
   // Requests a hull or a body again if it changed while its shape was in flight.
   fetchIfOlder(id) {
     if (this.watch.ownsHulls) return;
-    const told = this.model.info.get(id)?.revision;
-    if (isNewer(told, this.model.revisionOf(id))) this.fetchHulls([id]);
+    const revision = this.model.info.get(id)?.revision;
+    if (isNewer(revision, this.model.revisionOf(id))) this.fetchHulls([id]);
   }
 
   frame(frame) {

@@ -11,7 +11,7 @@ from hulld.v1 import status_pb2
 
 @dataclass(frozen=True)
 class Limits:
-    """The limits in force. Each is set by a flag of the server."""
+    """The server's limits. Each is set by a flag of the server."""
 
     max_points_per_chunk: int
     max_vertices_per_hull: int

@@ -82,15 +82,15 @@ class AppendState:
     ) -> None:
         self.hull_id = arguments.hull_id(hull_id)
         self.writer_id = (
-            arguments.text(writer_id, "writer_id", least=1)
+            arguments.text(writer_id, "writer_id", minimum=1)
             if writer_id is not None
             else f"python-{os.urandom(8).hex()}"
         )
         self._create = create
         self._max_bytes = arguments.count(
-            max_in_flight_bytes, "max_in_flight_bytes", least=1, most=1 << 62
+            max_in_flight_bytes, "max_in_flight_bytes", minimum=1, maximum=1 << 62
         )
-        self._max_chunks = arguments.count(max_in_flight_chunks, "max_in_flight_chunks", least=1)
+        self._max_chunks = arguments.count(max_in_flight_chunks, "max_in_flight_chunks", minimum=1)
         self.opened: Opened | None = None
         self._unacknowledged: collections.deque[_Chunk] = collections.deque()
         self._bytes_in_flight = 0
@@ -232,7 +232,7 @@ def pieces(points: PointsLike, if_revision: int | None, chunk_bytes: int) -> Ite
     if_revision."""
     array = as_points(points)
     arguments.revision(if_revision)
-    size = arguments.count(chunk_bytes, "chunk_bytes", least=1)
+    size = arguments.count(chunk_bytes, "chunk_bytes", minimum=1)
     chunks = list(chunks_of(array, size))
     if if_revision is not None and len(chunks) > 1:
         raise ValueError(

@@ -34,15 +34,17 @@ class Search:
     """Attempts to reach a lost server. The deadline counts from the first failure, regardless of
     how long the connection was quiet before."""
 
-    def __init__(self, policy: RetryPolicy, patience: float | None, connected: bool) -> None:
-        """connected: True if the server was reached before; then only `patience` bounds the
-        attempts."""
+    def __init__(
+        self, policy: RetryPolicy, reconnect_timeout: float | None, connected: bool
+    ) -> None:
+        """connected: True if the server was reached before; then only `reconnect_timeout` bounds
+        the attempts."""
         self._policy = dataclasses.replace(policy, max_attempts=None) if connected else policy
-        self._patience = patience
+        self._reconnect_timeout = reconnect_timeout
         self._attempts: Attempts | None = None
 
     def wait_after(self, error: HulldError) -> float:
         """Like Attempts.wait_after."""
         if self._attempts is None:
-            self._attempts = Attempts(self._policy, True, self._patience)
+            self._attempts = Attempts(self._policy, True, self._reconnect_timeout)
         return self._attempts.wait_after(error)

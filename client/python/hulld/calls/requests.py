@@ -131,7 +131,7 @@ def get_hull_mesh(
         if max_vertices is None and max_error is None:
             raise ValueError("side requires max_vertices or max_error")
         request.simplification.max_vertices = (
-            arguments.optional_count(max_vertices, "max_vertices", least=1) or 0
+            arguments.optional_count(max_vertices, "max_vertices", minimum=1) or 0
         )
         request.simplification.max_error = arguments.optional_length(max_error, "max_error") or 0.0
     return _call("HullService", "GetHullMesh", request, bytes, True)
@@ -346,7 +346,7 @@ def find_collisions(
 ) -> Call[bytes]:
     fixed = collision_pb2.FindCollisionsRequest(
         wanted=wanted.message(),
-        limit=arguments.optional_count(limit, "limit", least=1),
+        limit=arguments.optional_count(limit, "limit", minimum=1),
         tolerance=arguments.length(tolerance, "tolerance"),
         first_only=first_only,
         every_piece=every_piece,

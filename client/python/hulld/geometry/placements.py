@@ -51,7 +51,7 @@ class Placement:
     end_pose: PoseLike = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "radius", arguments.number(self.radius, "radius", least=0))
+        object.__setattr__(self, "radius", arguments.number(self.radius, "radius", minimum=0))
         if self.points is None:
             arguments.hull_id(self.id, "the ID of a placement")
         elif self.id is not None:

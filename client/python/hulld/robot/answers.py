@@ -70,7 +70,7 @@ class RobotCheck:
 
     @property
     def separation(self) -> Separation | None:
-        """The least separation of any configuration; None if not requested."""
+        """The smallest separation of any configuration; None if not requested."""
         if self.separations is None or self.separation_bounds is None:
             return None
         at = self._strongest()

@@ -177,7 +177,9 @@ def _check_times(relation: Relation, contact: FirstContact, max_time_error: floa
     until, time = contact.separated_until, contact.contact_time
     if relation == Relation.SEPARATED:
         if until != 1 or time is not None:
-            raise VerificationError("the pair is SEPARATED, but not until 1, or it has a contact")
+            raise VerificationError(
+                "the pair is SEPARATED, but separated_until is not 1, or there is a contact_time"
+            )
         return
     if time is None or not 0 <= until <= time <= 1:
         raise VerificationError(f"the bracket of the contact is invalid: {until} to {time}")
@@ -207,7 +209,7 @@ def _check_contact(
     differences = differences_of(certificate, *places)
     if len(differences) <= 6 and surrounds_origin(differences):
         if relation == Relation.TOUCHING:
-            raise VerificationError("the hulls overlap, so they do not only touch")
+            raise VerificationError("the hulls overlap; they do not merely touch")
         return
     # All differences of vertices move alike: their hulls at both times span those in between.
     until = contact.separated_until

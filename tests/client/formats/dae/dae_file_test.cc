@@ -74,8 +74,10 @@ TEST(DaeFile, UnitAndScaleAreRoundedTogether) {
   EXPECT_THAT(ReadDaeText(text, options).xyz(),
               ElementsAreArray({0.0021, -0.021, 0.0, 0.003, -0.06, 0.03, 0.012, -0.15, 0.06}));
   options.scale[0] = *LengthScale::FromText("1e-308");
-  EXPECT_THAT(ReadDaeText(DaeReplaced(kPlate, "0.01", "1e-300"), options).error(),
-              HasSubstr("FILE:2: <COLLADA> has a unit that, times the scale, is beyond double"));
+  EXPECT_THAT(
+      ReadDaeText(DaeReplaced(kPlate, "0.01", "1e-300"), options).error(),
+      HasSubstr(
+          "FILE:2: <COLLADA> has a unit that overflows a double when multiplied by the scale"));
 }
 
 TEST(DaeFile, UnitsMustBeLengths) {
@@ -117,9 +119,9 @@ TEST(DaeFile, AccessorsHaveOffsetsStridesAndParameters) {
   EXPECT_THAT(read("1 2 3 4 5 6", "count='2' stride='3'",
                    "<param name='X'/><param name='Y'/><param name='W'/>")
                   .error(),
-              HasSubstr("FILE:6: <accessor> has not all of the parameters X, Y, and Z"));
+              HasSubstr("FILE:6: <accessor> lacks some of the parameters X, Y, and Z"));
   EXPECT_THAT(read("1 2 3 4 5 6", "count='2'", "").error(),
-              HasSubstr("FILE:6: <accessor> has stride 1, without room for x, y, and z"));
+              HasSubstr("FILE:6: <accessor> has stride 1, too small for x, y, and z"));
   EXPECT_THAT(read("1 2 3 4 5 6", "count='2' stride='0'", "").error(), HasSubstr("without room"));
   for (const char* accessor : {"count='3' stride='3'", "count='2' offset='1' stride='3'",
                                "count='2' stride='4'", "count='4294967295' stride='4294967295'"}) {
@@ -202,21 +204,21 @@ TEST(DaeFile, PrimitivesThatLackOrExceedVerticesAreRefused) {
     return Error(WithPrimitives(primitives));
   };
   EXPECT_EQ(error("<triangles count='1'>" + in + "\n<p>0 1\n5</p></triangles>"),
-            "FILE:12: \"5\" names no vertex; the mesh has 5, counted from 0");
+            "FILE:12: \"5\" is not the index of a vertex; the mesh has 5 vertices, counted from 0");
   EXPECT_THAT(error("<lines count='1'>" + in + "<p>0 -1</p></lines>"),
-              HasSubstr("FILE:10: \"-1\" names no vertex"));
+              HasSubstr("FILE:10: \"-1\" is not the index of a vertex"));
   EXPECT_EQ(error("<triangles count='2'>" + in + "<p>0 1 2</p></triangles>"),
             "FILE:10: <triangles> declares 2, but has 1; is the file complete?");
   EXPECT_THAT(error("<triangles count='1'>" + in + "</triangles>"), HasSubstr("but has 0"));
   EXPECT_THAT(error("<tristrips count='1'>" + in + "<p>0 1 2</p><p>0 1 2</p></tristrips>"),
               HasSubstr("<tristrips> declares 1, but has 2"));
   EXPECT_EQ(error("<triangles>" + in + "<p>0 1 2 3</p></triangles>"),
-            "FILE:10: <triangles> has 4 corners, not 3 for each one");
+            "FILE:10: <triangles> has 4 corners, not a multiple of 3");
   EXPECT_EQ(error("<lines>" + in + "<p>0 1 2</p></lines>"),
-            "FILE:10: <lines> has 3 corners, not 2 for each one");
+            "FILE:10: <lines> has 3 corners, not a multiple of 2");
   EXPECT_EQ(
       error("<triangles>" + in + "<input semantic='NORMAL' offset='1'/><p>0 1 2</p></triangles>"),
-      "FILE:10: <p> has 3 indices, not 2 for each corner");
+      "FILE:10: <p> has 3 indices, not a multiple of 2");
   EXPECT_EQ(error("<polylist>" + in + "<vcount>4</vcount><p>0 1 2</p></polylist>"),
             "FILE:10: \"4\" is not a number of corners; <p> has 3 more");
   EXPECT_EQ(error("<polylist>" + in + "<vcount>3</vcount><p>0 1 2 3</p></polylist>"),
@@ -236,7 +238,8 @@ TEST(DaeFile, SourcesThatAreMissingOrDisagreeAreRefused) {
               HasSubstr("FILE:9: <input> refers to no <source>"));
   EXPECT_THAT(Error(DaeText("#numbers", "#elsewhere")),
               HasSubstr("FILE:9: <input> refers to no <source>"));
-  EXPECT_THAT(Error(DaeText("POSITION", "NORMAL")), HasSubstr("FILE:11: \"0\" names no vertex"));
+  EXPECT_THAT(Error(DaeText("POSITION", "NORMAL")),
+              HasSubstr("FILE:11: \"0\" is not the index of a vertex"));
   EXPECT_THAT(Error(DaeText("<vertices id=\"corners\"", "<vertices id=\"others\"")),
               HasSubstr("FILE:10: <triangles> has no input VERTEX"));
   EXPECT_EQ(Error(DaeText(kNumbers, "0 0 0 200 0 x 0 0 50")), "FILE:5: \"x\" is not a number");

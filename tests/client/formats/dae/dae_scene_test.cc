@@ -100,8 +100,7 @@ TEST(DaeScene, TransformsWithoutMeaningAreRefused) {
   EXPECT_THAT(error("<scale>1 inf 3</scale>"), HasSubstr("3 finite numbers"));
   EXPECT_EQ(error("<rotate>0 0 1 147,423584</rotate>"),
             "FILE:15: \"147,423584\" is not a number (use a point as the decimal mark)");
-  EXPECT_EQ(error("<rotate>0 0 0 90</rotate>"),
-            "FILE:15: <rotate> has no direction: a length of 0");
+  EXPECT_EQ(error("<rotate>0 0 0 90</rotate>"), "FILE:15: <rotate> has a direction of length 0");
   EXPECT_THAT(error("<matrix>1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 2</matrix>"),
               HasSubstr("<matrix> has a last row other than 0 0 0 1"));
   EXPECT_THAT(error("<matrix>1</matrix>"), HasSubstr("<matrix> is not 16 finite numbers"));
@@ -185,7 +184,7 @@ TEST(DaeScene, ReferencesMustHaveOneTarget) {
 TEST(DaeScene, UnsupportedElementsAreRefusedByName) {
   EXPECT_THAT(
       Error(Scene("<node><instance_controller url='#skin'/></node>")),
-      HasSubstr("FILE:15: <instance_controller> shows a mesh with a skin or morph targets"));
+      HasSubstr("FILE:15: <instance_controller> instantiates a mesh with a skin or morph targets"));
   std::string text = DaeText("<mesh>", "<spline>");
   text = DaeReplaced(text, "</mesh>", "</spline>");
   EXPECT_THAT(Error(text), HasSubstr("FILE:4: <geometry> is not a <mesh>"));

@@ -26,31 +26,31 @@ TEST_F(HullctlWatch, ReportsExistingHulls) {
   Put("a/cube", server::Cube());
   Create("a/empty");
   Create("b");
-  Ran ran = Ask({"watch", "a/", "--until-synced"});
+  Ran ran = Run({"watch", "a/", "--until-synced"});
   EXPECT_EQ(ran.code, 0) << ran.err;
   EXPECT_EQ(ran.out,
             "PRESENT\ta/cube\t2\t8 of 8 points\t0 0 0 to 1 1 1\n"
             "PRESENT\ta/empty\t3\t0 of 0 points\n"
             "# synced at revision 4\n");
-  ran = Ask({"watch", "a/empt", "--exact", "--until-synced"});
+  ran = Run({"watch", "a/empt", "--exact", "--until-synced"});
   EXPECT_EQ(ran.out, "# synced at revision 4\n");
-  ran = Ask({"watch", "b", "--exact", "--until-synced", "--output", "name"});
+  ran = Run({"watch", "b", "--exact", "--until-synced", "--output", "name"});
   EXPECT_THAT(ran.out, HasSubstr("b\n"));
-  ran = Ask({"watch", "b", "--until-synced", "--output", "json"});
+  ran = Run({"watch", "b", "--until-synced", "--output", "json"});
   EXPECT_THAT(ran.out, MatchesRegex("\\{.*\"kind\":\"HULL_EVENT_KIND_PRESENT\".*\\}\n"
                                     "\\{.*\"synced\":true.*\\}\n"));
 }
 
 TEST_F(HullctlWatch, ReportsBodies) {
   Put("a/cube", server::Cube());
-  ASSERT_EQ(Ask({"body", "put", "a/body", "a/cube", "a/cube@3,0,0"}).code, 0);
-  Ran ran = Ask({"watch", "a/", "--until-synced"});
+  ASSERT_EQ(Run({"body", "put", "a/body", "a/cube", "a/cube@3,0,0"}).code, 0);
+  Ran ran = Run({"watch", "a/", "--until-synced"});
   EXPECT_EQ(ran.code, 0) << ran.err;
   EXPECT_EQ(ran.out,
             "PRESENT\ta/body\t3\tbody of 2 pieces\n"
             "PRESENT\ta/cube\t2\t8 of 8 points\t0 0 0 to 1 1 1\n"
             "# synced at revision 3\n");
-  ran = Ask({"watch", "a/body", "--exact", "--until-synced", "--output", "name"});
+  ran = Run({"watch", "a/body", "--exact", "--until-synced", "--output", "name"});
   EXPECT_THAT(ran.out, HasSubstr("a/body\n"));
 }
 
@@ -81,7 +81,7 @@ class Growth {
 
 TEST_F(HullctlWatch, ReportsChanges) {
   const Growth growth(*hulls_);
-  const Ran ran = Ask({"watch", "hull", "--events", "5"});
+  const Ran ran = Run({"watch", "hull", "--events", "5"});
   EXPECT_EQ(ran.code, 0) << ran.err;
   EXPECT_THAT(ran.out, AllOf(HasSubstr("PRESENT\thull\t"), HasSubstr("CHANGED\thull\t")));
 }
@@ -128,27 +128,27 @@ TEST_F(HullctlWatch, ReportsCollisionsOfAScene) {
   const TempFile text("scene.yaml",
                       "place:\n  left: {id: cube}\n  right: {id: cube, at: [1, 0, 0]}\n"
                       "  lost: {id: none}\nask: {pairs: [[left, right], [left, lost]]}\n");
-  Ran ran = Ask({"watch", "--scene", text.path(), "--until-synced"});
+  Ran ran = Run({"watch", "--scene", text.path(), "--until-synced"});
   EXPECT_EQ(ran.code, 0) << ran.err;
   EXPECT_EQ(ran.out, "TOUCH\tleft\tright\t2\t2\n# synced at revision 2\n");
   EXPECT_THAT(ran.err, HasSubstr("placement lost: hull \"none\" not found"));
   const TempFile json("scene.json",
                       "{\"placements\":[{\"hullId\":\"cube\"},{\"hullId\":\"cube\"}],"
                       "\"wanted\":{\"clearance\":1}}");
-  ran = Ask({"watch", "--scene", json.path(), "--until-synced"});
+  ran = Run({"watch", "--scene", json.path(), "--until-synced"});
   EXPECT_EQ(ran.out, "ENTER\t0:cube\t1:cube\t2\t2\n# synced at revision 2\n");
-  ran = Ask({"watch", "--scene", json.path(), "--until-synced", "--output", "json"});
+  ran = Run({"watch", "--scene", json.path(), "--until-synced", "--output", "json"});
   EXPECT_THAT(ran.out, HasSubstr("\"kind\":\"COLLISION_EVENT_KIND_ENTER\""));
 }
 
 TEST_F(HullctlWatch, ErrorsAreClear) {
-  Ran ran = Ask({"watch", "a//b", "--exact"});
+  Ran ran = Run({"watch", "a//b", "--exact"});
   EXPECT_EQ(ran.code, 1);
   EXPECT_THAT(ran.err, HasSubstr("empty segment"));
-  ran = Ask({"watch", "a", "--scene", "scene.json"});
+  ran = Run({"watch", "a", "--scene", "scene.json"});
   EXPECT_EQ(ran.code, 2);
   EXPECT_THAT(ran.err, HasSubstr("cannot be combined with PREFIX"));
-  ran = Ask({"watch", "--scene", "/no/such/file"});
+  ran = Run({"watch", "--scene", "/no/such/file"});
   EXPECT_EQ(ran.code, 2);
 }
 

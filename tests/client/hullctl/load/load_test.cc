@@ -15,19 +15,19 @@ void IgnoreProgress(double /*share*/, uint64_t /*requests*/) {}
 
 TEST(Load, SendsEachRequestOnceForAnyNumberOfClients) {
   std::mutex mutex;
-  std::multiset<uint64_t> asked;
+  std::multiset<uint64_t> requests;
   const LoadRequest client = [&](uint64_t i) -> absl::StatusOr<uint64_t> {
     const std::lock_guard lock(mutex);
-    asked.insert(i);
+    requests.insert(i);
     return i;
   };
   LoadPlan plan;
   plan.requests = 100;
   const std::atomic<bool> stop = false;
   const LoadResult result = RunLoad(plan, {client, client, client}, stop, IgnoreProgress);
-  EXPECT_EQ(asked.size(), 100U);
-  EXPECT_EQ(std::set<uint64_t>(asked.begin(), asked.end()).size(), 100U);
-  EXPECT_EQ(*asked.rbegin(), 99U);
+  EXPECT_EQ(requests.size(), 100U);
+  EXPECT_EQ(std::set<uint64_t>(requests.begin(), requests.end()).size(), 100U);
+  EXPECT_EQ(*requests.rbegin(), 99U);
   EXPECT_EQ(result.items, 99U * 100 / 2);
   EXPECT_EQ(result.latencies.count(), 100U);
   EXPECT_EQ(result.failed(), 0U);

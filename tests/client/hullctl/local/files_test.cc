@@ -58,7 +58,7 @@ class Files : public HullctlOnServer {
 
 TEST_F(Files, AreCheckedWithoutBeingStored) {
   const std::string cube = Write("cube.xyz", server::Cube());
-  const Ran ran = Ask({"check", cube, cube, "--pose-b", "1,0,0"});
+  const Ran ran = Run({"check", cube, cube, "--pose-b", "1,0,0"});
   EXPECT_EQ(ran.code, 0) << ran.err;
   EXPECT_THAT(ran.out, HasSubstr("TOUCHING"));
   EXPECT_THAT(ran.out, HasSubstr(cube + "  (8 points)"));
@@ -69,24 +69,24 @@ TEST_F(Files, CollideWithHullsAndAreVerified) {
   Put("ball", server::Sphere(300));
   const std::string cube = Write("cube.xyz", server::Cube());
   for (const char* const pose : {"0,0,0", "1,0,0", "3,0,0"}) {
-    const Ran ran = Ask({"check", "ball", cube, "--pose-b", pose, "--verify"});
+    const Ran ran = Run({"check", "ball", cube, "--pose-b", pose, "--verify"});
     EXPECT_EQ(ran.code, 0) << ran.err;
     EXPECT_THAT(ran.out, HasSubstr("valid"));
   }
-  ASSERT_EQ(Ask({"body", "put", "pair", "ball", "ball@5,0,0"}).code, 0);
-  const Ran body = Ask({"check", "pair", cube, "--pose-b", "1,0,0", "--verify"});
+  ASSERT_EQ(Run({"body", "put", "pair", "ball", "ball@5,0,0"}).code, 0);
+  const Ran body = Run({"check", "pair", cube, "--pose-b", "1,0,0", "--verify"});
   EXPECT_EQ(body.code, 0) << body.err;
   const std::string record = (folder_ / "answer.json").string();
-  ASSERT_EQ(Ask({"check", cube, "ball", "--record", record}).code, 0);
-  EXPECT_EQ(Ask({"verify", record}).code, 0);
-  EXPECT_EQ(Ask({"check", cube, "ball", "--textbook", "--axis"}).code, 0);
+  ASSERT_EQ(Run({"check", cube, "ball", "--record", record}).code, 0);
+  EXPECT_EQ(Run({"verify", record}).code, 0);
+  EXPECT_EQ(Run({"check", cube, "ball", "--textbook", "--axis"}).code, 0);
 }
 
 TEST_F(Files, HaveRadii) {
   Put("cube", server::Cube());
   const std::string center = Write("center.xyz", {0, 0, 0});
   const auto check = [&](const std::string& radius) {
-    return Ask({"check", "cube", center, "--pose-b", "4,5,0.5", "--radius-a", "2", "--radius-b",
+    return Run({"check", "cube", center, "--pose-b", "4,5,0.5", "--radius-a", "2", "--radius-b",
                 radius, "--verify"});
   };
   const Ran touching = check("3");
@@ -99,23 +99,23 @@ TEST_F(Files, HaveRadii) {
   EXPECT_THAT(check("3.0000000000000004").out, HasSubstr("OVERLAPPING"));
   EXPECT_THAT(check("-1").err, HasSubstr("\"-1\" is not a length of at least 0"));
   const std::string record = (folder_ / "rounded.json").string();
-  ASSERT_EQ(Ask({"check", "cube", center, "--radius-b", "1", "--record", record}).code, 0);
-  EXPECT_EQ(Ask({"verify", record}).code, 0);
+  ASSERT_EQ(Run({"check", "cube", center, "--radius-b", "1", "--record", record}).code, 0);
+  EXPECT_EQ(Run({"verify", record}).code, 0);
 }
 
 TEST_F(Files, PiecesHaveRadii) {
   Put("cube", server::Cube());
   const std::string center = Write("center.xyz", {0, 0, 0});
-  ASSERT_EQ(Ask({"body", "put", "row", "cube", "cube@4,0,0:0.25"}).code, 0);
-  EXPECT_THAT(Ask({"body", "get", "row"}).out, HasSubstr("1      cube  4,0,0  0.25\n"));
-  const Ran ran = Ask({"check", "row", center, "--pose-b", "6,0.5,0.5", "--radius-a", "0.25",
+  ASSERT_EQ(Run({"body", "put", "row", "cube", "cube@4,0,0:0.25"}).code, 0);
+  EXPECT_THAT(Run({"body", "get", "row"}).out, HasSubstr("1      cube  4,0,0  0.25\n"));
+  const Ran ran = Run({"check", "row", center, "--pose-b", "6,0.5,0.5", "--radius-a", "0.25",
                        "--radius-b", "0.5", "--verify"});
   EXPECT_EQ(ran.code, 0) << ran.err;
   EXPECT_THAT(ran.out, HasSubstr("TOUCHING"));
   EXPECT_THAT(ran.out, HasSubstr("piece of A   1: cube"));
-  EXPECT_THAT(Ask({"body", "put", "row", "cube:wide"}).err,
+  EXPECT_THAT(Run({"body", "put", "row", "cube:wide"}).err,
               HasSubstr("\"cube:wide\": the radius after the colon is not a length"));
-  EXPECT_THAT(Ask({"body", "put", "row", ":1"}).err, HasSubstr("names no hull"));
+  EXPECT_THAT(Run({"body", "put", "row", ":1"}).err, HasSubstr("names no hull"));
 }
 
 TEST_F(Files, OfManyPointsSendTheirVertices) {
@@ -123,7 +123,7 @@ TEST_F(Files, OfManyPointsSendTheirVertices) {
   const server::Coordinates inside = server::Sphere(5000);
   cloud.insert(cloud.end(), inside.begin(), inside.end());
   const std::string file = Write("cloud.xyz", cloud);
-  const Ran ran = Ask({"check", file, file, "--pose-b", "4,0,0"});
+  const Ran ran = Run({"check", file, file, "--pose-b", "4,0,0"});
   EXPECT_EQ(ran.code, 0) << ran.err;
   EXPECT_THAT(ran.out, HasSubstr("TOUCHING"));
   EXPECT_THAT(ran.out, HasSubstr("(8 points)"));
@@ -132,7 +132,7 @@ TEST_F(Files, OfManyPointsSendTheirVertices) {
 
 TEST_F(Files, OfManyVerticesNeedALocalServer) {
   const std::string file = Write("ball.xyz", server::Sphere(5000));
-  const Ran refused = Ask({"check", file, file});
+  const Ran refused = Run({"check", file, file});
   EXPECT_EQ(refused.code, 2);
   EXPECT_THAT(refused.err, HasSubstr("ball.xyz: its hull has 5000 vertices"));
   EXPECT_THAT(refused.err, HasSubstr("use --local"));
@@ -142,12 +142,12 @@ TEST_F(Files, OfManyVerticesNeedALocalServer) {
 }
 
 TEST_F(Files, AreNamedInErrors) {
-  EXPECT_THAT(Ask({"check", "./part", "./part"}).err, HasSubstr("./part"));
-  EXPECT_THAT(Ask({"check", (folder_ / "none.stl").string(), "a"}).err, HasSubstr("none.stl"));
+  EXPECT_THAT(Run({"check", "./part", "./part"}).err, HasSubstr("./part"));
+  EXPECT_THAT(Run({"check", (folder_ / "none.stl").string(), "a"}).err, HasSubstr("none.stl"));
   const std::string empty = Write("empty.xyz", {});
-  EXPECT_THAT(Ask({"check", empty, empty}).err, HasSubstr("empty.xyz: contains no points"));
+  EXPECT_THAT(Run({"check", empty, empty}).err, HasSubstr("empty.xyz: contains no points"));
   // A name without a matching file is an ID.
-  EXPECT_THAT(Ask({"check", "part.stl", "part.stl"}).err, HasSubstr("part.stl"));
+  EXPECT_THAT(Run({"check", "part.stl", "part.stl"}).err, HasSubstr("part.stl"));
 }
 
 TEST(Local, NeedsNoServer) {

@@ -26,7 +26,7 @@ class Judge : public CubeServer {
  protected:
   Ran JudgeText(const std::string& table, std::vector<std::string> options = {}) {
     options.insert(options.begin(), {"judge", Write("answers.csv", table)});
-    return Ask(std::move(options));
+    return Run(std::move(options));
   }
 
   static std::vector<std::string> Lines(const std::string& text) {
@@ -62,13 +62,12 @@ TEST_F(Judge, WrongAnswersComeWorstFirstWithTheirProof) {
   ASSERT_EQ(lines.size(), 8u) << ran.out;
   EXPECT_THAT(lines[0], StartsWith("line 3\tcube\tcube\tfalse contact\toff by 1\tSEPARATED\t1 "));
   EXPECT_THAT(lines[1], StartsWith("line 5\tcube\tcube\tmiss\toff by 0.75\tOVERLAPPING\t-0.75"));
-  EXPECT_THAT(lines[2], HasSubstr("line 6\tcube\tcube\ttouching mistaken\toff by 0.5"));
+  EXPECT_THAT(lines[2], HasSubstr("line 6\tcube\tcube\ttouching\toff by 0.5"));
   EXPECT_THAT(lines[3], HasSubstr("line 2\tcube\tcube\tdistance\toff by 0.25\tSEPARATED\t2 "));
-  EXPECT_THAT(lines[4], HasSubstr("line 4\tcube\tcube\ttouching mistaken\toff by 0\tTOUCHING"));
+  EXPECT_THAT(lines[4], HasSubstr("line 4\tcube\tcube\ttouching\toff by 0\tTOUCHING"));
   for (size_t i = 0; i < 5; ++i) EXPECT_THAT(lines[i], EndsWith("\tvalid"));
   EXPECT_EQ(lines[5], "# 5 answers, 5 wrong, 0 failed");
-  EXPECT_EQ(lines[6],
-            "# false contact 1, miss 1, touching mistaken 2, distance 1, depth 0, time 0");
+  EXPECT_EQ(lines[6], "# false contact 1, miss 1, touching 2, distance 1, depth 0, time 0");
   EXPECT_THAT(lines[7], StartsWith("# largest error of a distance 0.25"));
 }
 
@@ -76,7 +75,7 @@ TEST_F(Judge, AProgramThatReportsOnlyCollisionsMayReportTouchingEitherWay) {
   const Ran ran = JudgeText(
       "a b b_x colliding\ncube cube 1 1\ncube cube 1 0\ncube cube 0.5 true\ncube cube 2 false\n");
   EXPECT_EQ(ran.code, 1);
-  EXPECT_THAT(ran.out, StartsWith("line 3\tcube\tcube\ttouching mistaken\t"));
+  EXPECT_THAT(ran.out, StartsWith("line 3\tcube\tcube\ttouching\t"));
   EXPECT_THAT(ran.out, HasSubstr("# 4 answers, 1 wrong"));
 }
 
@@ -91,7 +90,7 @@ TEST_F(Judge, JsonLinesAreRecordsForVerify) {
   ASSERT_EQ(lines.size(), 2u) << ran.out;
   EXPECT_THAT(lines[0], StartsWith("{\"line\":\"2\",\"fault\":\"false contact\",\"error\":1"));
   EXPECT_THAT(lines[1], StartsWith("{\"answers\":\"1\",\"wrong\":\"1\",\"falseContacts\":\"1\""));
-  const Ran verified = Ask({"verify", Write("record.json", lines[0])});
+  const Ran verified = Run({"verify", Write("record.json", lines[0])});
   EXPECT_EQ(verified.out, "SEPARATED: valid\n");
   EXPECT_THAT(Lines(JudgeText("a,b,b_x,colliding\ncube,cube,9,1\n", {"--output", "name"}).out),
               ElementsAre("2"));
@@ -118,13 +117,13 @@ TEST_F(Judge, FindsTheErrorsOfAFloatBoxTestWithAMargin) {
       const float with_margin = std::max(static_cast<float>(one) - kMargin, 0.0F);
       squared += with_margin * with_margin;
     }
-    const bool says_contact = squared == 0;
+    const bool claims_contact = squared == 0;
     const double distance = std::sqrt(squared);
-    false_contacts += says_contact && exact_squared > 0;
+    false_contacts += claims_contact && exact_squared > 0;
     largest = std::max(largest, std::abs(distance - std::sqrt(exact_squared)));
     std::ostringstream text;
     text.precision(17);
-    text << row << "," << says_contact << "," << distance << "\n";
+    text << row << "," << claims_contact << "," << distance << "\n";
     table += text.str();
   }
   ASSERT_GT(false_contacts, 3);
@@ -132,7 +131,7 @@ TEST_F(Judge, FindsTheErrorsOfAFloatBoxTestWithAMargin) {
   EXPECT_EQ(ran.code, 1);
   EXPECT_THAT(ran.out, HasSubstr("# 300 answers, " + std::to_string(false_contacts) + " wrong"));
   EXPECT_THAT(ran.out, HasSubstr("# false contact " + std::to_string(false_contacts) +
-                                 ", miss 0, touching mistaken 0, distance 0, depth 0, time 0"));
+                                 ", miss 0, touching 0, distance 0, depth 0, time 0"));
   const std::string reported = ran.out.substr(ran.out.find("of a distance ") + 14);
   EXPECT_NEAR(std::stod(reported), largest, 1e-9);
 }
@@ -196,12 +195,11 @@ TEST_F(Judge, TimesOfContactAreJudgedAgainstTheProvenBracket) {
   EXPECT_THAT(lines[3], StartsWith("line 3\tcube\tcube\ttime\toff by 0.0625\t"));
   for (size_t i = 0; i < 4; ++i) EXPECT_THAT(lines[i], EndsWith("\tvalid"));
   EXPECT_EQ(lines[4], "# 7 answers, 4 wrong, 0 failed");
-  EXPECT_EQ(lines[5],
-            "# false contact 1, miss 1, touching mistaken 0, distance 0, depth 0, time 2");
+  EXPECT_EQ(lines[5], "# false contact 1, miss 1, touching 0, distance 0, depth 0, time 2");
   EXPECT_THAT(lines[6], EndsWith(", of a time 0.25"));
   EXPECT_THAT(JudgeText(table, {"--max-time-error", "0.1"}).out, HasSubstr("3 wrong"));
   const std::string record = Lines(JudgeText(table, {"--output", "json"}).out)[0];
-  EXPECT_EQ(Ask({"verify", Write("record.json", record)}).out, "OVERLAPPING: valid\n");
+  EXPECT_EQ(Run({"verify", Write("record.json", record)}).out, "OVERLAPPING: valid\n");
 }
 
 TEST_F(Judge, ThePlotShowsTheProgramNextToTheServer) {

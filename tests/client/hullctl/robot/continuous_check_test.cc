@@ -32,7 +32,7 @@ class Continuous : public HullctlOnServer {
     const TempFile waypoints("path.csv", path);
     more.insert(more.begin(), {"robot", "check", description.path(), "--adjacent", "--trajectory",
                                waypoints.path()});
-    return Ask(more);
+    return Run(more);
   }
   Ran CheckMotion(const std::string& urdf, const std::string& path,
                   std::vector<std::string> more = {}) {

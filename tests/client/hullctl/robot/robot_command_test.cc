@@ -28,9 +28,9 @@ class HullctlRobot : public HullctlOnServer {
 
   Ran Robot(std::vector<std::string> more) {
     more.insert(more.begin(), {"robot", "check", urdf_.path()});
-    return Ask(more);
+    return Run(more);
   }
-  std::string Hulls() { return Ask({"list", "--output", "name"}).out; }
+  std::string Hulls() { return Run({"list", "--output", "name"}).out; }
 
   const TempFile urdf_;
 };
@@ -61,7 +61,7 @@ TEST_F(HullctlRobot, SpheresAndCapsulesAreExact) {
     <geometry><capsule radius="0.25" length="2"/></geometry></collision></link>
 </robot>)");
   const auto relation = [&](const char* value) {
-    return Ask({"robot", "check", urdf.path(), "--adjacent", "--joint", std::string("i=") + value})
+    return Run({"robot", "check", urdf.path(), "--adjacent", "--joint", std::string("i=") + value})
         .out;
   };
   EXPECT_THAT(relation("0"), HasSubstr("a\tb\tSEPARATED\t1.2499999999"));
@@ -71,8 +71,8 @@ TEST_F(HullctlRobot, SpheresAndCapsulesAreExact) {
   const TempFile scene("scene.yaml",
                        "hulls: {p: {points: [[0, 0, 0]]}}\nplace: {ball: {hull: p, at: [0, 1, 0], "
                        "radius: 0.5}}\n");
-  ASSERT_EQ(Ask({"scene", "apply", scene.path()}).code, 0);
-  const Ran around = Ask({"robot", "check", urdf.path(), "--scene", scene.path()});
+  ASSERT_EQ(Run({"scene", "apply", scene.path()}).code, 0);
+  const Ran around = Run({"robot", "check", urdf.path(), "--scene", scene.path()});
   EXPECT_THAT(around.out, HasSubstr("a\tball\tTOUCHING")) << around.err;
 }
 
@@ -123,7 +123,7 @@ TEST_F(HullctlRobot, ASceneSurroundsTheRobot) {
 
 TEST_F(HullctlRobot, ABodySurroundsTheRobot) {
   Put("cube", server::Cube());
-  ASSERT_EQ(Ask({"body", "put", "stand", "cube@9,9,9", "cube@0,0,0.5"}).code, 0);
+  ASSERT_EQ(Run({"body", "put", "stand", "cube@9,9,9", "cube@0,0,0.5"}).code, 0);
   const TempFile scene("cell.yaml", "place:\n  stand: {id: stand}\n");
   const Ran ran = Robot({"--scene", scene.path(), "--base", "0,0,0"});
   EXPECT_THAT(ran.out, HasSubstr("a\tstand\tTOUCHING\t0"));
@@ -132,11 +132,11 @@ TEST_F(HullctlRobot, ABodySurroundsTheRobot) {
 }
 
 TEST_F(HullctlRobot, CheckReadsTheOutputOfAcm) {
-  const Ran ran = Ask({"robot", "acm", urdf_.path(), "--samples", "500", "--seed", "7"});
+  const Ran ran = Run({"robot", "acm", urdf_.path(), "--samples", "500", "--seed", "7"});
   EXPECT_EQ(ran.code, 0) << ran.err;
   EXPECT_THAT(ran.out, HasSubstr("link1=\"a\" link2=\"b\" reason=\"Adjacent\""));
   EXPECT_THAT(ran.out, Not(HasSubstr("link1=\"a\" link2=\"c\"")));
-  EXPECT_EQ(Ask({"robot", "acm", urdf_.path(), "--samples", "500", "--seed", "7"}).out, ran.out);
+  EXPECT_EQ(Run({"robot", "acm", urdf_.path(), "--samples", "500", "--seed", "7"}).out, ran.out);
   const TempFile srdf("chain.srdf", ran.out);
   EXPECT_THAT(Robot({"--srdf", srdf.path()}).out, HasSubstr("# 1 pair; 2 excluded by "));
 }
@@ -154,10 +154,10 @@ constexpr char kBareUrdf[] = R"(<robot name="bare">
 
 TEST_F(HullctlRobot, PairsLeftOutThroughLinksWithoutShapesAreCounted) {
   const TempFile bare("bare.urdf", kBareUrdf);
-  const Ran ran = Ask({"robot", "check", bare.path()});
+  const Ran ran = Run({"robot", "check", bare.path()});
   EXPECT_THAT(ran.out, HasSubstr("# 1 pair; 2 excluded by adjacency, 1 of them joined "
                                  "through links without shapes\n"));
-  EXPECT_THAT(Ask({"robot", "check", bare.path(), "--adjacent"}).out,
+  EXPECT_THAT(Run({"robot", "check", bare.path(), "--adjacent"}).out,
               HasSubstr("# 3 pairs\na\tb\tOVERLAPPING"));
 }
 
@@ -173,7 +173,7 @@ TEST_F(HullctlRobot, AdjacentIsSuggestedOnlyIfItHelps) {
                       "<robot name=\"r\"><disable_collisions link1=\"a\" link2=\"b\"/></robot>");
   const auto error = [&](std::vector<std::string> more) {
     more.insert(more.begin(), {"robot", "check"});
-    const Ran ran = Ask(more);
+    const Ran ran = Run(more);
     EXPECT_EQ(ran.code, 2);
     return ran.err;
   };
@@ -198,25 +198,25 @@ constexpr char kLooseUrdf[] = R"(<robot name="loose">
 
 TEST_F(HullctlRobot, PlanarAndFloatingJointsAcceptValues) {
   const TempFile loose("loose.urdf", kLooseUrdf);
-  Ran ran = Ask({"robot", "check", loose.path(), "--joint", "free=1,0,0"});
+  Ran ran = Run({"robot", "check", loose.path(), "--joint", "free=1,0,0"});
   EXPECT_EQ(ran.code, 0) << ran.err;
   EXPECT_THAT(ran.out, HasSubstr("# 1 pair\ncrate\tcart\tTOUCHING\t0"));
-  ran = Ask({"robot", "check", loose.path(), "--joint", "wheels=3,0,1.5707963267948966", "--joint",
+  ran = Run({"robot", "check", loose.path(), "--joint", "wheels=3,0,1.5707963267948966", "--joint",
              "free=1,0,0,0,5.5,0,0"});
   EXPECT_THAT(ran.out, HasSubstr("crate\tcart\tSEPARATED\t1."));
-  ran = Ask({"robot", "check", loose.path(), "--joint", "wheels/x=-1", "--joint", "free/rot_z=1"});
+  ran = Run({"robot", "check", loose.path(), "--joint", "wheels/x=-1", "--joint", "free/rot_z=1"});
   EXPECT_THAT(ran.out, HasSubstr("crate\tcart\tTOUCHING\t0"));
   const TempFile path("path.csv", "wheels/x,free/trans_z\n0,3\n0,1\n4,0\n");
-  ran = Ask({"robot", "check", loose.path(), "--joints", path.path()});
+  ran = Run({"robot", "check", loose.path(), "--joints", path.path()});
   EXPECT_THAT(ran.out, HasSubstr("2\tENTER\tcrate\tcart\tTOUCHING"));
   for (const char* wrong :
        {"wheels=1,2", "free=1", "free=0,0,0,0,1,2,3", "free/rot_w=0", "fre=1"}) {
-    ran = Ask({"robot", "check", loose.path(), "--joint", wrong});
+    ran = Run({"robot", "check", loose.path(), "--joint", wrong});
     EXPECT_EQ(ran.code, 2) << wrong;
     EXPECT_THAT(ran.err, HasSubstr("--joint: ")) << wrong;
   }
   // The crate's position is unbounded, so samples cannot show that it never collides.
-  ran = Ask({"robot", "acm", loose.path(), "--samples", "5"});
+  ran = Run({"robot", "acm", loose.path(), "--samples", "5"});
   EXPECT_EQ(ran.code, 0) << ran.err;
   EXPECT_THAT(ran.out, Not(HasSubstr("disable_collisions")));
 }
@@ -254,7 +254,7 @@ class MeshRobot : public HullctlRobot {
             "<joint name=\"j\" type=\"fixed\"><parent link=\"gap\"/><child link=\"post\"/></joint>"
             "</robot>");
     more.insert(more.begin(), {"robot", "check", urdf.path(), "--adjacent"});
-    return Ask(more);
+    return Run(more);
   }
 };
 
@@ -307,7 +307,7 @@ TEST_F(StoredHulls, ChecksStoreNothing) {
   EXPECT_EQ(Robot({}).code, 0);
   EXPECT_EQ(Robot({"--joints", path.path()}).code, 0);
   EXPECT_EQ(Robot({"--joints", path.path(), "--continuous"}).code, 0);
-  EXPECT_EQ(Ask({"robot", "acm", urdf_.path(), "--samples", "5"}).code, 0);
+  EXPECT_EQ(Run({"robot", "acm", urdf_.path(), "--samples", "5"}).code, 0);
   EXPECT_EQ(Check(BoxObj("o box", 0, 1)).code, 0);
   EXPECT_EQ(Revision(), before);
   EXPECT_EQ(Hulls(), "cube\n");
@@ -354,10 +354,10 @@ TEST_F(HullctlRobot, ErrorsNameFileAndLine) {
   const TempFile mesh("m.urdf",
                       "<robot name=\"m\">\n<link name=\"l\">\n<collision><geometry><mesh "
                       "filename=\"package://p/a.stl\"/></geometry></collision></link></robot>");
-  const Ran ran = Ask({"robot", "check", mesh.path()});
+  const Ran ran = Run({"robot", "check", mesh.path()});
   EXPECT_EQ(ran.code, 2);
   EXPECT_THAT(ran.err, HasSubstr("m.urdf:3: link \"l\": no folder of the package \"p\""));
-  EXPECT_EQ(Ask({"robot", "check", mesh.path(), "--package", "p"}).code, 2);
+  EXPECT_EQ(Run({"robot", "check", mesh.path(), "--package", "p"}).code, 2);
 }
 
 }  // namespace robot_command_test

@@ -151,7 +151,7 @@ TEST_F(RobotScene, MistakesNameTheFile) {
   arguments_.srdf = "/no/such.srdf";
   EXPECT_THAT(std::string(Add().message()), HasSubstr("/no/such.srdf"));
   // A refused robot leaves no hull.
-  EXPECT_EQ(Ask({"list", "--output", "name"}).out, "");
+  EXPECT_EQ(Run({"list", "--output", "name"}).out, "");
 }
 
 TEST_F(RobotScene, AFloatingJointNeedsARotation) {

@@ -66,7 +66,7 @@ TEST(SceneFile, WithoutPairsAllPairsOfPlacementsAreChecked) {
   }
 }
 
-TEST(SceneFile, TheFormerLineFormatIsRefusedWithItsYamlEquivalent) {
+TEST(SceneFile, TheOldLineFormatIsRefusedWithItsYamlEquivalent) {
   const auto refused = [](int line, const std::string& yaml) {
     return "FILE:" + std::to_string(line) +
            ": a scene is YAML, not lines of place and pair; write " + yaml +

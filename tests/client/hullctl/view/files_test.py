@@ -15,14 +15,14 @@ from viewer_case import AT_REST
 
 
 class FilesTest(viewer_case.ViewerCase):
-    def test_files_are_not_stored_beside_hulls(self):
+    def test_shown_files_are_not_stored_on_the_server(self):
         before = self.hulld.hullctl("list", "--output", "name")
         self.view("room/left", "/usr/share/assimp/models/OBJ/spider.obj")
         self.browser.wait("document.querySelector('#collision-count').textContent !== ''")
         self.browser.js("hulldViewer.model.select(0); hulldViewer.model.select(1, true)")
         self.assertEqual(self.hulld.hullctl("list", "--output", "name"), before)
 
-    def test_a_killed_viewer_leaves_nothing(self):
+    def test_a_killed_viewer_leaves_nothing_behind(self):
         viewer = self.hulld.view("/usr/share/assimp/models/OBJ/spider.obj")
         self.browser.open(viewer.address)
         folder = pathlib.Path(self.browser.js("hulldViewer.server").removeprefix("unix:")).parent
@@ -35,7 +35,7 @@ class FilesTest(viewer_case.ViewerCase):
             pass
         self.assertEqual(self.hulld.hullctl("list", "view/", "--output", "name"), "")
 
-    def test_one_file_shows_all_without_a_server(self):
+    def test_one_file_shows_everything_without_a_server(self):
         target = pathlib.Path(self.hulld.directory, "room.html")
         self.hulld.hullctl("view", "room/left", "room/right", "--html", str(target))
         self.browser.driver.get(target.as_uri())
@@ -59,7 +59,7 @@ class FilesTest(viewer_case.ViewerCase):
         self.assertAlmostEqual(float(self.browser.fact("separation")), 2)
         self.assertIn("\u2713 Proven", self.browser.text("#proof"))
 
-    def test_pairs_that_a_scene_names_are_the_queried_ones(self):
+    def test_only_the_pairs_that_a_scene_names_are_queried(self):
         place = "place: {left: {id: box}, middle: {id: box}, right: {id: box, at: [1, 0, 0]}}\n"
         rows = "[...document.querySelectorAll('#collisions .names')].map((row) => row.textContent)"
         for name, text, names in (

@@ -41,7 +41,7 @@ class PictureTest(viewer_case.ViewerCase):
         pathlib.Path(self.hulld.directory, name).write_text(json.dumps(scene))
         return name
 
-    def test_objects_of_a_pair_never_share_a_color(self):
+    def test_objects_of_a_pair_have_different_colors(self):
         for count in (25, 210):
             self.view(self.place_boxes("colors.json", [(5 * i, 0, 0) for i in range(count)]))
             self.assertTrue(self.browser.js("""(() => {
@@ -224,7 +224,7 @@ class PictureTest(viewer_case.ViewerCase):
         self.assertEqual(colors, self.browser.js(
             "hulldViewer.model.objects.map((object) => hulldViewer.model.colorOf(object))"))
 
-    def test_radii_are_drawn_and_told(self):
+    def test_radii_are_drawn_and_labeled(self):
         self.hulld.add("dot", ["0 0 0"])
         self.hulld.hullctl("body", "put", "dumbbell", "dot", "dot@3,0,0")
         self.addCleanup(self.hulld.hullctl, "body", "delete", "dumbbell")

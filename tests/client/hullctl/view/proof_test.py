@@ -53,7 +53,7 @@ class ProofTest(viewer_case.ViewerCase):
         is_proven = verdict["verdict"] == "VALID" or "which are more than" in verdict["reason"]
         return "" if is_proven else verdict["reason"]
 
-    def test_page_and_hullctl_judge_certificates_alike(self):
+    def test_page_and_hullctl_agree_on_certificates(self):
         random = Random(20)
         for name, count in (("proof/a", 12), ("proof/b", 30)):
             self.hulld.add(name, [" ".join(repr(random.gauss(0, 1)) for _ in range(3))
@@ -87,7 +87,7 @@ class ProofTest(viewer_case.ViewerCase):
         self.assertGreater(proven, 8)
         self.assertGreater(refuted, 8)
 
-    def test_page_and_hullctl_judge_motions_alike(self):
+    def test_page_and_hullctl_agree_on_motions(self):
         random = Random(31)
         self.hulld.add("rod", ["0 0 0", "5 0 0"])
         self.hulld.add("ceiling", [f"{x} {y} {z}" for x in (0, 6) for y in (4, 5) for z in (-1, 1)])

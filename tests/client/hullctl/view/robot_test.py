@@ -108,7 +108,7 @@ class RobotTest(viewer_case.ViewerCase):
             relations.add(self.browser.text("#relation").split()[-1])
         self.assertEqual(relations, {"separated", "overlapping"})
 
-    def test_a_robot_stands_in_its_surroundings(self):
+    def test_a_robot_is_shown_in_its_surroundings(self):
         pathlib.Path(self.hulld.directory, "cell.yaml").write_text(
             "prefix: cell/\nhulls: {post: {box: [1, 1, 1]}}\n"
             "place: {post: {hull: post, at: [4, 0, 2]}, lamp: {hull: post, at: [4, 0, 2.9]},\n"

@@ -16,7 +16,7 @@ from selenium.webdriver.common.keys import Keys
 class ViewerTest(viewer_case.ViewerCase):
     # --- Pictures ---
 
-    def test_canvas_is_not_blank_and_follows_what_is_shown(self):
+    def test_the_canvas_shows_exactly_the_visible_objects(self):
         self.view("room/")
         full = self.pixels()
         self.assertGreater(full["colors"], 20)
@@ -28,7 +28,7 @@ class ViewerTest(viewer_case.ViewerCase):
         self.browser.wait("hulldViewer.model.objects.every((o) => !o.visible)")
         self.assertLess(self.pixels()["drawn"], full["drawn"] / 3)
 
-    def test_points_mesh_and_hull_are_drawn_by_themselves_and_together(self):
+    def test_points_mesh_and_hull_are_drawn_separately_and_together(self):
         self.view("/usr/share/assimp/models/OBJ/spider.obj")
         drawn = {}
         for shown in (["points"], ["mesh"], ["hull"], ["mesh", "hull", "edges"]):
@@ -59,7 +59,7 @@ class ViewerTest(viewer_case.ViewerCase):
         self.assertEqual(answer["relation"], "RELATION_SEPARATED")
         self.assertAlmostEqual(answer["separation"]["value"], 1)
 
-    def test_drag_changes_the_answer_as_the_api_says(self):
+    def test_a_drag_shows_the_answer_of_the_api(self):
         self.view("room/left", "room/right")
         self.assert_answers_as_api()
         before = self.browser.js("hulldViewer.model.objects[1].pose")
@@ -77,7 +77,7 @@ class ViewerTest(viewer_case.ViewerCase):
         self.assertEqual(self.browser.js("hulldViewer.model.objects[1].pose.slice(0, 4)"),
                          [1, 0, 0, 0])
 
-    def test_turn_by_the_handles_is_answered(self):
+    def test_rotating_by_the_handles_updates_the_answer(self):
         self.view("room/left", "room/right")
         self.assert_answers_as_api()
         self.browser.driver.find_element(By.ID, "mode-turn").click()
@@ -187,7 +187,7 @@ class ViewerTest(viewer_case.ViewerCase):
         self.hulld.add("other", ["9 0.5 0.5"])
         self.browser.wait(f"{shape}.high[0] === 9")
 
-    def test_pieces_of_bodies_are_shown_with_them_alone(self):
+    def test_pieces_are_shown_only_with_their_body(self):
         for side in ("a", "b"):
             self.hulld.add_box(f"parts/{side}")
         self.hulld.hullctl("body", "put", "parts/all", "parts/a", "parts/b@3,0,0")
@@ -221,7 +221,7 @@ class ViewerTest(viewer_case.ViewerCase):
 
     # --- Changes of hulls ---
 
-    def test_hulls_grow_appear_and_go(self):
+    def test_hulls_grow_appear_and_disappear(self):
         self.hulld.add_box("live/a", size=1.0, low=(0.0, 0.0, 0.0))
         self.view("live/")
         self.browser.wait("hulldViewer.model.hulls.get('live/a')?.vertexCount === 8")
@@ -274,7 +274,7 @@ class ViewerTest(viewer_case.ViewerCase):
 
     # --- The page ---
 
-    def test_a_simpler_hull_is_shown_with_its_proven_error(self):
+    def test_a_simplified_hull_is_shown_with_its_proven_error(self):
         self.view("/usr/share/assimp/models/OBJ/spider.obj")
         self.browser.js("(() => { const slider = document.querySelector('#simplify');"
                         " slider.value = 30; slider.dispatchEvent(new Event('input')); })()")
@@ -299,7 +299,7 @@ class ViewerTest(viewer_case.ViewerCase):
               reach(hull.xyz, 0, [0, 0, 0]) - 1e-4;
         })()"""))
 
-    def test_answer_of_a_simpler_hull_stands_beside_the_exact_one(self):
+    def test_the_answer_for_a_simplified_hull_is_shown_next_to_the_exact_one(self):
         self.hulld.hullctl("generate", "sphere", "200", "--seed", "3", "-o", "ball.xyz")
         self.hulld.hullctl("append", "ball", "ball.xyz", "--create")
         self.view("room/right", "ball")
@@ -331,7 +331,7 @@ class ViewerTest(viewer_case.ViewerCase):
             self.assertLessEqual(low, simple["value"] + simple["bound"])
             self.assertGreaterEqual(high, simple["value"] - simple["bound"])
 
-    def test_the_shell_about_many_facets_is_as_far_out_as_it_says(self):
+    def test_the_shell_of_many_facets_is_at_the_distance_of_the_tolerance(self):
         self.hulld.hullctl("generate", "sphere", "12000", "-o", "many.xyz")
         self.hulld.hullctl("append", "many", "many.xyz", "--create")
         self.view("many")
@@ -356,7 +356,7 @@ class ViewerTest(viewer_case.ViewerCase):
         self.assertGreater(least, 0.98)
         self.assertLess(most, 1.0001)
 
-    def test_usable_at_phone_and_desk_width(self):
+    def test_the_layout_fits_phones_and_desktops(self):
         self.view("room/")
         for width, height in ((390, 844), (1440, 900), (768, 1024)):
             self.browser.resize(width, height)
@@ -389,7 +389,7 @@ class ViewerTest(viewer_case.ViewerCase):
             .map((e) => e.outerHTML)""")
         self.assertEqual(nameless, [])
 
-    def test_keyboard_does_all(self):
+    def test_everything_works_by_keyboard(self):
         self.view("room/")
         self.browser.wait("hulldViewer.model.collisions.revision")
         viewer = "hulldViewer.model."
@@ -429,7 +429,7 @@ class ViewerTest(viewer_case.ViewerCase):
         self.keys(Keys.ESCAPE)
         self.browser.wait("!document.querySelector('#keys').open")
 
-    def test_far_from_the_origin_nothing_jitters(self):
+    def test_nothing_jitters_far_from_the_origin(self):
         self.hulld.add_box("far/here")
         scene = {"placements": [
             {"hullId": "far/here", "pose": {"translation": {"x": 1e9, "y": -1e9, "z": 1e9}}},
@@ -459,7 +459,7 @@ class ViewerTest(viewer_case.ViewerCase):
         self.browser.wait("hulldViewer.model.selected !== null")
         self.assert_answers_as_api()
 
-    def test_tolerance_of_the_pair_is_answered_beside_the_exact_answer(self):
+    def test_the_tolerant_answer_is_shown_next_to_the_exact_one(self):
         self.view("room/left", "room/right")
         self.assert_answers_as_api()
         self.browser.js("(() => { const slider = document.querySelector('#tolerance');"
@@ -473,7 +473,7 @@ class ViewerTest(viewer_case.ViewerCase):
         # The exact answer remains visible.
         self.assert_answers_as_api()
 
-    def test_address_lets_one_browser_in_once(self):
+    def test_the_address_admits_one_browser_once(self):
         viewer = self.hulld.view("box")
         self.addCleanup(viewer.stop)
         self.browser.open(viewer.address)

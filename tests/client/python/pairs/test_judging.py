@@ -166,7 +166,7 @@ def test_motions_and_pairs_at_rest_share_a_table(
     assert judged.time_errors[1] == pytest.approx(1 / 12)
 
 
-def test_a_turning_motion_takes_the_shorter_way(client: hulld.Client) -> None:
+def test_a_rotation_takes_the_shorter_path(client: hulld.Client) -> None:
     # A quarter turn brings the bar into the cube; the quaternion is given with the other sign.
     bar = np.array([[-3, -0.1, -0.1], [3, -0.1, -0.1], [-3, 0.1, 0.1], [3, 0.1, 0.1]])
     said = {

@@ -278,7 +278,7 @@ def test_a_trajectory_has_a_first_contact(chain: hulld.Robot) -> None:
         check[5]
 
 
-def test_many_configurations_go_in_several_calls(
+def test_many_configurations_are_split_over_several_calls(
     chain: hulld.Robot, monkeypatch: pytest.MonkeyPatch, client: hulld.Client, name: str
 ) -> None:
     client.append_points(name, CUBE, create=True)
@@ -299,7 +299,7 @@ def test_many_configurations_go_in_several_calls(
         _ = nothing.relation
 
 
-def test_a_scene_stands_around(chain: hulld.Robot, client: hulld.Client, name: str) -> None:
+def test_a_scene_surrounds_the_robot(chain: hulld.Robot, client: hulld.Client, name: str) -> None:
     client.append_points(name, CUBE, create=True)
     scene = [(name, (0, 0, 0.5)), (name, (9, 0, 0))]
     check = chain.check([[0, 0], [0, -2]], scene=scene, separation=True)
@@ -324,7 +324,7 @@ def test_a_scene_stands_around(chain: hulld.Robot, client: hulld.Client, name: s
         chain.check([[0, 0], [1, 1]], scene=["nowhere"])
 
 
-def test_bodies_stand_around(chain: hulld.Robot, client: hulld.Client, name: str) -> None:
+def test_bodies_surround_the_robot(chain: hulld.Robot, client: hulld.Client, name: str) -> None:
     client.append_points(name, CUBE, create=True)
     client.put_body(f"{name}/body", [(name, (9, 9, 9)), (name, (-0.5, 0, 0.25))])
     check = chain.check([0, 0], scene=[f"{name}/body"], separation=True)
@@ -365,7 +365,7 @@ def test_hulls_are_deleted_unless_a_prefix_keeps_them(
     assert ids(f"{name}/") == [f"{name}/a", f"{name}/b", f"{name}/c"]
 
 
-def test_names_that_are_no_ids_are_registered(
+def test_names_that_are_not_ids_are_registered(
     tmp_path: pathlib.Path, client: hulld.Client, name: str
 ) -> None:
     text = CHAIN.replace('"a"', '"ä 1"').replace('"b"', '"ö 1"').replace('"c"', '"_c"')

@@ -564,11 +564,11 @@ void ExpectToStopAnywhere(std::span<const Vector> points, int steps) {
   EXPECT_TRUE(SameBits(*whole, hull));
   EXPECT_EQ(polls, (steps + 1023) / 1024);
   for (int last = 1; last <= polls; ++last) {
-    int asked = 0;
-    const absl::StatusOr<Hull> stopped = builder.Snapshot([&] { return ++asked == last; });
+    int polls_to_stop = 0;
+    const absl::StatusOr<Hull> stopped = builder.Snapshot([&] { return ++polls_to_stop == last; });
     EXPECT_EQ(stopped.status().code(), absl::StatusCode::kCancelled) << stopped.status();
     // After a stop, it does not poll again.
-    EXPECT_EQ(asked, last);
+    EXPECT_EQ(polls_to_stop, last);
   }
   EXPECT_TRUE(SameBits(builder.Snapshot(), hull));
 }

@@ -259,7 +259,7 @@ TEST(HullCost, BlocksOfExtremeCloudsCostNoMoreThanTheirPoints) {
 }
 
 // Returns the server's memory for a hull at rest that grew and was queried, in bytes per vertex.
-double AskedBytes(const HullBuilder& builder) {
+double RequestedBytes(const HullBuilder& builder) {
   LiveHull live(builder.Vertices(), builder.dimension());
   live.Prepare(live.Now());
   return static_cast<double>(live.MemoryBytes() + builder.MemoryBytes()) /
@@ -274,15 +274,15 @@ void ExpectSmall(const HullBuilder& builder, const char* name) {
   const double snapshot = static_cast<double>(hull.MemoryBytes()) / vertices;
   const double queried = snapshot + static_cast<double>(QueryHull(hull).MemoryBytes()) / vertices;
   const double built = static_cast<double>(builder.MemoryBytes()) / vertices;
-  const double asked = AskedBytes(builder);
+  const double requested = RequestedBytes(builder);
   EXPECT_LE(snapshot, 100) << name;
   EXPECT_LE(queried, 150) << name;
   EXPECT_LE(built, 230) << name;
-  EXPECT_LE(asked, 300) << name;
+  EXPECT_LE(requested, 300) << name;
   std::printf(
       "%s: %.0f vertices, bytes for each: snapshot %.0f, with queries %.0f, builder %.0f, with "
       "queries %.0f\n",
-      name, vertices, snapshot, queried, built, asked);
+      name, vertices, snapshot, queried, built, requested);
   // At least the vertices and the triangles are counted.
   EXPECT_GE(snapshot, 24 + 24 + 24) << name;
   EXPECT_GE(built, 24 + 2 * 64 - 1) << name;
@@ -325,9 +325,9 @@ TEST(HullCost, MemoryOfSmallHullsIsSmall) {
   Random random(TestSeed(504));
   // A LiveHull has two: a mutex takes 40 bytes on x86-64, and 48 on 64-bit ARM.
   const double mutexes = 2 * (static_cast<double>(sizeof(std::mutex)) - 40);
-  EXPECT_LE(AskedBytes(BuiltAtOnce(RandomOnSphere(random, 8, 1))), 700 + mutexes / 8);
-  EXPECT_LE(AskedBytes(BuiltAtOnce(RandomOnSphere(random, 24, 1))), 650);
-  EXPECT_LE(AskedBytes(BuiltAtOnce(RandomOnSphere(random, 64, 1))), 400);
+  EXPECT_LE(RequestedBytes(BuiltAtOnce(RandomOnSphere(random, 8, 1))), 700 + mutexes / 8);
+  EXPECT_LE(RequestedBytes(BuiltAtOnce(RandomOnSphere(random, 24, 1))), 650);
+  EXPECT_LE(RequestedBytes(BuiltAtOnce(RandomOnSphere(random, 64, 1))), 400);
 }
 
 TEST(HullCost, MemoryOfFlatHullsIsCounted) {

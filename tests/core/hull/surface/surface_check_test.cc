@@ -131,7 +131,7 @@ TEST_F(SurfaceCheck, FindsADeadVertex) {
   fewer.Remove(Triangle(0).corners[2]);
   EXPECT_STREQ(Defect(fewer), "F is not 2 V - 4");
   Triangle(0).corners[2] = 1'000'000;
-  EXPECT_STREQ(Defect(), "a corner is no vertex");
+  EXPECT_STREQ(Defect(), "a corner is not a vertex");
 }
 
 TEST_F(SurfaceCheck, FindsTrianglesWithoutArea) {

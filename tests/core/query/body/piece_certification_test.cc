@@ -110,7 +110,7 @@ TEST(PieceCertification, ProvesEveryRelation) {
     // Bodies with equal poses meet as lattices do.
     if (round % 3 != 0) X_WB.t += Vector(random.Between(-4, 4), random.Between(-4, 4), 0);
     QueryOptions options = Certified();
-    // Also with the least separation; its pair is found differently.
+    // Also with the smallest separation; its pair is found differently.
     options.want_separation = round % 2 == 0;
     const auto answer = CheckBodies(a.Placed(X_WA), b.Placed(X_WB), options);
     ASSERT_TRUE(answer.ok()) << answer.status();

@@ -86,7 +86,7 @@ TEST(LatticeContact, FoundContactsTouch) {
     if (!contact) continue;
     ASSERT_EQ(OracleRelation(a, X_WA, b, X_WB), Relation::kTouching) << Describe(a, X_WA, b, X_WB);
     // The certificate consists of the axis and the pairs.
-    ASSERT_TRUE(check.Ask(a, X_WA, b, X_WB, Relation::kTouching, RelationCheck::kSearchOnly));
+    ASSERT_TRUE(check.Verify(a, X_WA, b, X_WB, Relation::kTouching, RelationCheck::kSearchOnly));
     const bool is_across = (contact->axis.array() == 0).count() == 2;
     across_axes += is_across ? 1 : 0;
     at_vertices += is_across ? 0 : 1;

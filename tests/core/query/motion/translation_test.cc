@@ -133,7 +133,7 @@ TEST(Translation, PiecesWithAPoseAgreeWithBruteForce) {
 
 // The contact of a point with a polygon, or of two segments, lasts only an instant; most are
 // between doubles.
-TEST(Translation, ContactsOfAnInstantAreFound) {
+TEST(Translation, InstantaneousContactsAreFound) {
   Random random(TestSeed(3));
   Counts counts;
   for (int round = 0; round < 60; ++round) {

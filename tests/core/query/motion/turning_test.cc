@@ -170,7 +170,7 @@ TEST(Turning, ACornerMeetsAWallOnTime) {
   }
 }
 
-TEST(Turning, GrazesAreNeitherMissedNorInvented) {
+TEST(Turning, GrazesAreNeitherMissedNorReportedFalsely) {
   const OwnMoving box(Box(1, 1, 1), Spinning(M_PI / 2, {0, 0, 0}, {0, 0, 0}));
   const double reach = std::sqrt(2.0);
   const auto relation_at = [&](double distance) {

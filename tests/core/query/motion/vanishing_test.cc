@@ -144,8 +144,8 @@ struct Counts {
 };
 
 // Queries a pair in which the rotation of A nearly vanishes.
-void Ask(const OwnMoving& a, const OwnMoving& b, const Motion& X_WA, const MotionOptions& options,
-         double miss, Counts& counts) {
+void CheckContact(const OwnMoving& a, const OwnMoving& b, const Motion& X_WA,
+                  const MotionOptions& options, double miss, Counts& counts) {
   const double least = LeastTime(X_WA);
   const std::optional<Rational> sampled = FirstSampledContact(a, b, TimesAround(least));
   const absl::StatusOr<FirstContact> contact = Find(a, b, options);
@@ -202,7 +202,7 @@ TEST(Vanishing, MotionsAreAnsweredOrRefusedAsTheContractSays) {
     const OwnMoving a(Scaled(RandomInBall(random, random.Between(4, 6), 1), scale), X_WA, 0,
                       round % 5 == 4 ? Pose{{1, 2, 0, 1}, scale * Vector(0.5, 0, 0)} : Pose());
     const OwnMoving b(Scaled(RandomInBall(random, random.Between(1, 6), 1), scale), {X_WB, X_WB});
-    Ask(a, b, X_WA, options, std::max(miss, length < 0x1p-1000 ? 0x1p-20 : 0), counts);
+    CheckContact(a, b, X_WA, options, std::max(miss, length < 0x1p-1000 ? 0x1p-20 : 0), counts);
   }
 #ifndef HULLD_SANITIZED
   EXPECT_GT(counts.refused, 10);
@@ -224,7 +224,7 @@ TEST(Vanishing, ASweepBetweenTwoTimesIsNeverMissed) {
       const OwnMoving a(Scaled(rod, scale), flip);
       const OwnMoving b(Scaled(post, scale), Motion());
       Counts counts;
-      Ask(a, b, flip, {}, miss, counts);
+      CheckContact(a, b, flip, {}, miss, counts);
       EXPECT_EQ(counts.separated, 0);
       if (miss > 0x1p-36) {
         EXPECT_EQ(counts.met_before + counts.met_there_or_after, 1);

@@ -60,14 +60,14 @@ Found Search(const Scene& scene, const SceneOptions& options, SceneTotals* total
   return found;
 }
 
-template <typename IsAsked>
-Found BruteForce(const Scene& scene, IsAsked is_asked, uint64_t* asked) {
+template <typename IsSelected>
+Found BruteForce(const Scene& scene, IsSelected is_selected, uint64_t* selected) {
   Found found;
-  *asked = 0;
+  *selected = 0;
   for (uint32_t a = 0; a < scene.placements.size(); ++a) {
     for (uint32_t b = a + 1; b < scene.placements.size(); ++b) {
-      if (!is_asked(a, b)) continue;
-      ++*asked;
+      if (!is_selected(a, b)) continue;
+      ++*selected;
       const Relation relation = CheckCollision(scene.placements[a], scene.placements[b])->relation;
       if (relation != Relation::kSeparated) found.emplace_back(PlacedPair{a, b}, relation);
     }
@@ -77,9 +77,9 @@ Found BruteForce(const Scene& scene, IsAsked is_asked, uint64_t* asked) {
 
 TEST(Scene, AgreesWithAllPairsInOrderOnAnyNumberOfThreads) {
   const Scene scene = MakeScene(821, 700, 20);
-  uint64_t asked = 0;
+  uint64_t selected = 0;
   const Found expected = BruteForce(
-      scene, [](uint32_t, uint32_t) { return true; }, &asked);
+      scene, [](uint32_t, uint32_t) { return true; }, &selected);
   size_t touching = 0;
   for (const auto& [pair, relation] : expected) touching += relation == Relation::kTouching;
   EXPECT_GT(touching, 50u);
@@ -89,19 +89,19 @@ TEST(Scene, AgreesWithAllPairsInOrderOnAnyNumberOfThreads) {
     options.threads = threads;
     SceneTotals totals;
     EXPECT_TRUE(Search(scene, options, &totals) == expected) << threads << " threads";
-    EXPECT_EQ(totals.pairs, asked);
+    EXPECT_EQ(totals.pairs, selected);
     EXPECT_EQ(totals.found, expected.size());
     // The boxes leave few pairs.
-    EXPECT_LT(totals.candidates, asked / 20);
+    EXPECT_LT(totals.candidates, selected / 20);
     EXPECT_GE(totals.candidates, totals.found);
   }
 }
 
 TEST(Scene, RadiiGrowTheBoxes) {
   const Scene scene = MakeScene(825, 400, 16, 1.5);
-  uint64_t asked = 0;
+  uint64_t selected = 0;
   const Found expected = BruteForce(
-      scene, [](uint32_t, uint32_t) { return true; }, &asked);
+      scene, [](uint32_t, uint32_t) { return true; }, &selected);
   SceneTotals totals;
   EXPECT_TRUE(Search(scene, SceneOptions(), &totals) == expected);
   SceneTotals without_radii;
@@ -127,12 +127,12 @@ TEST(Scene, GroupsAndMoversExcludeTheirPairs) {
     options.groups = groups;
     options.ignored_groups = ignored;
     options.movers = movers;
-    uint64_t asked = 0;
+    uint64_t selected = 0;
     const Found expected = BruteForce(
-        scene, [&](uint32_t a, uint32_t b) { return a < movers && !is_ignored(a, b); }, &asked);
+        scene, [&](uint32_t a, uint32_t b) { return a < movers && !is_ignored(a, b); }, &selected);
     SceneTotals totals;
     EXPECT_TRUE(Search(scene, options, &totals) == expected) << movers << " movers";
-    EXPECT_EQ(totals.pairs, asked);
+    EXPECT_EQ(totals.pairs, selected);
     EXPECT_EQ(expected.empty(), movers == 0);
   }
 }

@@ -421,7 +421,7 @@ bool HistoryClient::CallBodyAtRandom(const std::string& body_id,
   if (choice < 5) return PutBody(body_id, hulls);
   if (choice < 6) return DeleteBody(body_id, Below(2) == 0);
   if (choice < 9) return GetBody(body_id);
-  return Ask(body_id);
+  return QueryBody(body_id);
 }
 
 bool HistoryClient::PutBody(const std::string& body_id, const std::vector<std::string>& hulls) {
@@ -468,8 +468,8 @@ bool HistoryClient::GetBody(const std::string& body_id) {
   return End(body_id, operation, status);
 }
 
-bool HistoryClient::Ask(const std::string& body_id) {
-  Operation operation = Begin(Kind::kAsk);
+bool HistoryClient::QueryBody(const std::string& body_id) {
+  Operation operation = Begin(Kind::kBodyQuery);
   operation.probe = Below(kCloudSize);
   const double* at = HistoryCloud().data() + 3 * operation.probe;
   v1::CheckCollisionRequest request;
@@ -478,8 +478,8 @@ bool HistoryClient::Ask(const std::string& body_id) {
   *request.mutable_b() = PlacementOf(kProbeHull, at[0], at[1], at[2]);
   ChooseFreshnessOfSeveral(operation, *request.mutable_freshness());
   // A certificate names the hulls of all pieces; without one, the server looks them up differently.
-  operation.tells_pieces = Below(2) == 0;
-  request.mutable_wanted()->set_certificate(operation.tells_pieces);
+  operation.lists_pieces = Below(2) == 0;
+  request.mutable_wanted()->set_certificate(operation.lists_pieces);
   const grpc::Status status = collisions_->CheckCollision(NewContext().get(), request, &response);
   operation.create_revision = response.hull_a().create_revision();
   operation.revision = response.hull_a().revision();
@@ -492,7 +492,7 @@ bool HistoryClient::Ask(const std::string& body_id) {
     TakeVersion(version, response.header(), seen);
     operation.others.push_back(seen);
   };
-  if (operation.tells_pieces) {
+  if (operation.lists_pieces) {
     for (const v1::HullVersion& version : response.piece_hulls()) {
       if (version.hull_id() == kProbeHull) continue;
       operation.pieces.push_back(version.hull_id());

@@ -72,7 +72,7 @@ class HistoryClient {
   bool DeleteBody(const std::string& body_id, bool if_known_revision);
   bool GetBody(const std::string& body_id);
   // Queries whether the body touches a point of the cloud.
-  bool Ask(const std::string& body_id);
+  bool QueryBody(const std::string& body_id);
 
   // Issues one random call about all of these, each at the identity pose. IDs of hulls and of
   // bodies start with different first segments.
@@ -83,7 +83,7 @@ class HistoryClient {
   bool Scene(const std::vector<std::string>& hulls, const std::vector<std::string>& bodies);
   // Like Scene, but by a collision stream, which is opened if none is open. An open stream resolves
   // the hulls again, and sometimes moves a point.
-  bool AskStream(const std::vector<std::string>& hulls, const std::vector<std::string>& bodies);
+  bool QueryStream(const std::vector<std::string>& hulls, const std::vector<std::string>& bodies);
   // Lists in one page or in single-item pages. Requires: no other IDs have their prefix.
   bool ListHulls(const std::vector<std::string>& hulls);
   bool ListBodies(const std::vector<std::string>& bodies);
@@ -111,9 +111,9 @@ class HistoryClient {
   void ChooseFreshnessOfSeveral(Operation& operation, v1::Freshness& freshness);
   // Records an answer about several hulls, received now.
   void RecordSeveral(Operation operation, const v1::ResponseHeader& header, std::vector<Seen> seen);
-  std::vector<Seen> SeenIn(const JointQuery& asked, const JointAnswer& told,
+  std::vector<Seen> SeenIn(const JointQuery& query, const JointAnswer& answer,
                            const v1::Freshness& freshness);
-  void RecordAsked(const Operation& operation, const JointQuery& asked, const JointAnswer& told,
+  void RecordQuery(const Operation& operation, const JointQuery& query, const JointAnswer& answer,
                    const v1::Freshness& freshness);
   // Returns the next request: it opens the stream or queries again.
   v1::StreamCollisionsRequest NextMessage(const std::vector<std::string>& hulls,

@@ -37,14 +37,14 @@ bool IsAnswered(const grpc::Status& status) {
 struct HistoryClient::JointQuery {
   static JointQuery Make(const std::vector<std::string>& hulls,
                          const std::vector<std::string>& bodies, std::mt19937_64& random) {
-    JointQuery asked;
-    asked.ids = hulls;
-    asked.ids.insert(asked.ids.end(), bodies.begin(), bodies.end());
-    asked.hulls = hulls.size();
+    JointQuery query;
+    query.ids = hulls;
+    query.ids.insert(query.ids.end(), bodies.begin(), bodies.end());
+    query.hulls = hulls.size();
     for (int i = 0; i < kProbes; ++i) {
-      asked.points.push_back(static_cast<int>(random() % kCloudSize));
+      query.points.push_back(static_cast<int>(random() % kCloudSize));
     }
-    return asked;
+    return query;
   }
   template <typename Message>
   void AddPlacements(Message& message) const {
@@ -98,8 +98,8 @@ struct HistoryClient::CollisionStream {
   std::unique_ptr<
       grpc::ClientReaderWriter<v1::StreamCollisionsRequest, v1::StreamCollisionsResponse>>
       stream;
-  JointQuery asked;
-  JointAnswer told;
+  JointQuery query;
+  JointAnswer answer;
   v1::Freshness freshness;
   std::optional<uint64_t> max_staleness;
 };
@@ -118,35 +118,35 @@ bool HistoryClient::CallSeveralAtRandom(const std::vector<std::string>& hulls,
   const int choice = Below(12);
   if (choice < 4) return Batch(hulls, bodies);
   if (choice < 5) return Scene(hulls, bodies);
-  if (choice < 8) return AskStream(hulls, bodies);
+  if (choice < 8) return QueryStream(hulls, bodies);
   return choice < 10 || bodies.empty() ? ListHulls(hulls) : ListBodies(bodies);
 }
 
-std::vector<Seen> HistoryClient::SeenIn(const JointQuery& asked, const JointAnswer& told,
+std::vector<Seen> HistoryClient::SeenIn(const JointQuery& query, const JointAnswer& answer,
                                         const v1::Freshness& freshness) {
   std::vector<Seen> all;
-  for (uint32_t i = 0; i < asked.ids.size(); ++i) {
-    Seen seen{.hull_id = asked.ids[i], .at_least_revision = freshness.at_least_revision()};
-    const auto problem = told.problems.find(i);
-    if (problem != told.problems.end()) {
+  for (uint32_t i = 0; i < query.ids.size(); ++i) {
+    Seen seen{.hull_id = query.ids[i], .at_least_revision = freshness.at_least_revision()};
+    const auto problem = answer.problems.find(i);
+    if (problem != answer.problems.end()) {
       // A temporary read failure carries no information.
       if (problem->second.code() != static_cast<int>(grpc::StatusCode::NOT_FOUND)) continue;
       seen.missing_piece = MissingPiece(problem->second.message());
       seen.is_missing = seen.missing_piece.empty();
-      seen.store_id = told.header.store_id();
-      seen.store_revision = told.header.revision();
+      seen.store_id = answer.header.store_id();
+      seen.store_revision = answer.header.revision();
       all.push_back(seen);
       continue;
     }
-    if (i >= told.hulls.size()) {
+    if (i >= answer.hulls.size()) {
       ADD_FAILURE() << "an answer does not mention placement " << i;
       return {};
     }
-    TakeVersion(told.hulls[i], told.header, seen);
-    for (size_t k = 0; k < asked.points.size(); ++k) {
-      const std::optional<bool> touching = told.touching[i * asked.points.size() + k];
+    TakeVersion(answer.hulls[i], answer.header, seen);
+    for (size_t k = 0; k < query.points.size(); ++k) {
+      const std::optional<bool> touching = answer.touching[i * query.points.size() + k];
       seen.lacks_answer |= !touching.has_value();
-      const PointSet point = PointSet{1} << asked.points[k];
+      const PointSet point = PointSet{1} << query.points[k];
       seen.probed |= point;
       if (touching.value_or(false)) seen.touched |= point;
     }
@@ -155,9 +155,9 @@ std::vector<Seen> HistoryClient::SeenIn(const JointQuery& asked, const JointAnsw
   return all;
 }
 
-void HistoryClient::RecordAsked(const Operation& operation, const JointQuery& asked,
-                                const JointAnswer& told, const v1::Freshness& freshness) {
-  RecordSeveral(operation, told.header, SeenIn(asked, told, freshness));
+void HistoryClient::RecordQuery(const Operation& operation, const JointQuery& query,
+                                const JointAnswer& answer, const v1::Freshness& freshness) {
+  RecordSeveral(operation, answer.header, SeenIn(query, answer, freshness));
 }
 
 void HistoryClient::RecordSeveral(Operation operation, const v1::ResponseHeader& header,
@@ -173,57 +173,57 @@ void HistoryClient::RecordSeveral(Operation operation, const v1::ResponseHeader&
 
 bool HistoryClient::Batch(const std::vector<std::string>& hulls,
                           const std::vector<std::string>& bodies) {
-  const JointQuery asked = JointQuery::Make(hulls, bodies, random_);
+  const JointQuery query = JointQuery::Make(hulls, bodies, random_);
   Operation operation = Begin(Kind::kBatch);
   v1::BatchCheckCollisionsRequest request;
-  asked.AddPlacements(request);
-  asked.AddPairs(request);
+  query.AddPlacements(request);
+  query.AddPairs(request);
   ChooseFreshnessOfSeveral(operation, *request.mutable_freshness());
   const std::unique_ptr<grpc::ClientContext> context = NewContext();
   const auto reader = collisions_->BatchCheckCollisions(context.get(), request);
-  JointAnswer told;
-  told.touching.resize(asked.pairs());
+  JointAnswer answer;
+  answer.touching.resize(query.pairs());
   v1::BatchCheckCollisionsResponse message;
   while (reader->Read(&message)) {
-    told.TakeTable(message);
+    answer.TakeTable(message);
     for (int row = 0; row < message.columns().relations_size(); ++row) {
-      told.TakeRelation(message.first_pair() + row, message.columns().relations(row));
+      answer.TakeRelation(message.first_pair() + row, message.columns().relations(row));
     }
   }
   const grpc::Status status = reader->Finish();
   if (!status.ok()) return IsAnswered(status);
-  RecordAsked(operation, asked, told, request.freshness());
+  RecordQuery(operation, query, answer, request.freshness());
   return true;
 }
 
 bool HistoryClient::Scene(const std::vector<std::string>& hulls,
                           const std::vector<std::string>& bodies) {
-  const JointQuery asked = JointQuery::Make(hulls, bodies, random_);
+  const JointQuery query = JointQuery::Make(hulls, bodies, random_);
   Operation operation = Begin(Kind::kBatch);
   v1::FindCollisionsRequest request;
-  asked.AddPlacements(request);
+  query.AddPlacements(request);
   for (int i = 0; i < request.placements_size(); ++i) {
-    request.add_groups(i < static_cast<int>(asked.ids.size()) ? 0 : 1);
+    request.add_groups(i < static_cast<int>(query.ids.size()) ? 0 : 1);
   }
   request.set_ignore_same_group(true);
   ChooseFreshnessOfSeveral(operation, *request.mutable_freshness());
   const std::unique_ptr<grpc::ClientContext> context = NewContext();
   const auto reader = collisions_->FindCollisions(context.get(), request);
-  JointAnswer told;
+  JointAnswer answer;
   // Pairs not reported do not touch.
-  told.touching.assign(asked.pairs(), false);
+  answer.touching.assign(query.pairs(), false);
   v1::FindCollisionsResponse message;
   while (reader->Read(&message)) {
-    told.TakeTable(message);
+    answer.TakeTable(message);
     for (int row = 0; row < message.columns().relations_size(); ++row) {
       const size_t id = message.pairs(2 * row);
-      const size_t probe = message.pairs(2 * row + 1) - asked.ids.size();
-      told.TakeRelation(id * asked.points.size() + probe, message.columns().relations(row));
+      const size_t probe = message.pairs(2 * row + 1) - query.ids.size();
+      answer.TakeRelation(id * query.points.size() + probe, message.columns().relations(row));
     }
   }
   const grpc::Status status = reader->Finish();
   if (!status.ok()) return IsAnswered(status);
-  RecordAsked(operation, asked, told, request.freshness());
+  RecordQuery(operation, query, answer, request.freshness());
   return true;
 }
 
@@ -234,12 +234,12 @@ v1::StreamCollisionsRequest HistoryClient::NextMessage(const std::vector<std::st
   if (collision_stream_ == nullptr) {
     collision_stream_ = std::make_shared<CollisionStream>();
     CollisionStream& stream = *collision_stream_;
-    stream.asked = JointQuery::Make(hulls, bodies, random_);
-    stream.told.touching.resize(stream.asked.pairs());
+    stream.query = JointQuery::Make(hulls, bodies, random_);
+    stream.answer.touching.resize(stream.query.pairs());
     ChooseFreshnessOfSeveral(operation, stream.freshness);
     stream.max_staleness = operation.max_staleness;
-    stream.asked.AddPlacements(*request.mutable_open());
-    stream.asked.AddPairs(*request.mutable_open());
+    stream.query.AddPlacements(*request.mutable_open());
+    stream.query.AddPairs(*request.mutable_open());
     *request.mutable_open()->mutable_freshness() = stream.freshness;
     stream.context = NewContext();
     stream.stream = collisions_->StreamCollisions(stream.context.get());
@@ -250,23 +250,23 @@ v1::StreamCollisionsRequest HistoryClient::NextMessage(const std::vector<std::st
   update.set_refresh_hulls(true);
   if (Below(2) == 0) {
     const auto probe = static_cast<size_t>(Below(kProbes));
-    stream.asked.points[probe] = Below(kCloudSize);
-    update.add_placements(static_cast<uint32_t>(stream.asked.ids.size() + probe));
-    const double* at = PointAt(stream.asked.points[probe]);
+    stream.query.points[probe] = Below(kCloudSize);
+    update.add_placements(static_cast<uint32_t>(stream.query.ids.size() + probe));
+    const double* at = PointAt(stream.query.points[probe]);
     for (const double number : {1.0, 0.0, 0.0, 0.0, at[0], at[1], at[2]}) update.add_poses(number);
     // Its pairs will be answered again.
-    for (size_t i = 0; i < stream.asked.ids.size(); ++i) {
-      stream.told.touching[i * kProbes + probe] = std::nullopt;
+    for (size_t i = 0; i < stream.query.ids.size(); ++i) {
+      stream.answer.touching[i * kProbes + probe] = std::nullopt;
     }
   }
   operation.max_staleness = stream.max_staleness;
-  stream.told.hulls.clear();
-  stream.told.problems.clear();
+  stream.answer.hulls.clear();
+  stream.answer.problems.clear();
   return request;
 }
 
-bool HistoryClient::AskStream(const std::vector<std::string>& hulls,
-                              const std::vector<std::string>& bodies) {
+bool HistoryClient::QueryStream(const std::vector<std::string>& hulls,
+                                const std::vector<std::string>& bodies) {
   Operation operation = Begin(Kind::kBatch);
   const v1::StreamCollisionsRequest request = NextMessage(hulls, bodies, operation);
   CollisionStream& stream = *collision_stream_;
@@ -278,12 +278,12 @@ bool HistoryClient::AskStream(const std::vector<std::string>& hulls,
       collision_stream_ = nullptr;
       return IsAnswered(status);
     }
-    stream.told.TakeTable(message);
+    stream.answer.TakeTable(message);
     for (int row = 0; row < message.pairs_size(); ++row) {
-      stream.told.TakeRelation(message.pairs(row), message.columns().relations(row));
+      stream.answer.TakeRelation(message.pairs(row), message.columns().relations(row));
     }
   } while (!message.last());
-  RecordAsked(operation, stream.asked, stream.told, stream.freshness);
+  RecordQuery(operation, stream.query, stream.answer, stream.freshness);
   return true;
 }
 

@@ -45,7 +45,7 @@ std::string Describe(const Operation& operation) {
   if (!operation.pieces.empty()) {
     absl::StrAppend(&text, ", pieces ", absl::StrJoin(operation.pieces, " "));
   }
-  if (operation.kind == Kind::kAsk) {
+  if (operation.kind == Kind::kBodyQuery) {
     absl::StrAppend(&text, ", point ", operation.probe, operation.touching ? " touched" : " apart",
                     ", missing ", operation.missing);
   }
@@ -65,7 +65,7 @@ std::string Describe(const Operation& operation) {
 
 // Returns true if the operation concerns several hulls or bodies.
 bool IsJoint(const Operation& operation) {
-  return operation.kind == Kind::kPair || operation.kind == Kind::kAsk ||
+  return operation.kind == Kind::kPair || operation.kind == Kind::kBodyQuery ||
          operation.kind == Kind::kBatch;
 }
 

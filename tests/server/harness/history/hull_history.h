@@ -53,8 +53,8 @@ struct Operation {
     kPair,   // CheckCollision with another hull of the history
     kPut,    // of a body
     kGetBody,
-    kAsk,    // CheckCollision of a body with one point of the cloud
-    kBatch,  // a batch, scene, collision stream answer, or list page; its parts are in `others`
+    kBodyQuery,  // CheckCollision of a body with one point of the cloud
+    kBatch,      // a batch, scene, collision stream answer, or list page; its parts are in `others`
   };
   enum class Outcome {
     kOk,
@@ -113,14 +113,14 @@ struct Operation {
   uint64_t received = 0;
   uint64_t outside = 0;
   uint64_t duplicate = 0;
-  // Pair: the other hull. Ask: the hulls of pieces. Batch: the whole answer; the operation is
-  // recorded under the first and has no revisions of its own.
+  // Pair: the other hull. Body query: the hulls of pieces. Batch: the whole answer; the operation
+  // is recorded under the first and has no revisions of its own.
   std::vector<Seen> others;
-  // Ask: `pieces` names the hull of each piece exactly once.
-  bool tells_pieces = false;
-  // Ask, if touching: the hull of the deciding piece.
+  // Body query: `pieces` names the hull of each piece exactly once.
+  bool lists_pieces = false;
+  // Body query, if touching: the hull of the deciding piece.
   std::string deciding;
-  // Ask, if not found: the hull that a piece lacks; empty if the body is missing.
+  // Body query, if not found: the hull that a piece lacks; empty if the body is missing.
   std::string missing;
 };
 

@@ -245,16 +245,16 @@ bool HasPiece(const SpecifiedHull& body, const std::string& hull_id) {
   return std::find(body.pieces.begin(), body.pieces.end(), hull_id) != body.pieces.end();
 }
 
-bool StepAsk(SpecifiedHull& body, const Operation& operation, const FindSpecified& find) {
+bool StepBodyQuery(SpecifiedHull& body, const Operation& operation, const FindSpecified& find) {
   if (operation.outcome == Outcome::kNotFound) {
     if (operation.missing.empty()) return !body.exists;
     return body.exists && HasPiece(body, operation.missing) && !find(operation.missing).exists;
   }
   if (operation.outcome != Outcome::kOk) return false;
   if (!AgreeOnVersion(body, operation.create_revision, operation.revision)) return false;
-  if (operation.tells_pieces) {
-    const std::set<std::string> told(operation.pieces.begin(), operation.pieces.end());
-    if (told != std::set<std::string>(body.pieces.begin(), body.pieces.end())) return false;
+  if (operation.lists_pieces) {
+    const std::set<std::string> pieces(operation.pieces.begin(), operation.pieces.end());
+    if (pieces != std::set<std::string>(body.pieces.begin(), body.pieces.end())) return false;
   }
   for (const Seen& seen : operation.others) {
     if (!HasPiece(body, seen.hull_id)) return false;
@@ -322,7 +322,7 @@ bool Step(SpecifiedHull& state, const Operation& operation) {
     case Kind::kPut:
       return StepPut(state, operation);
     case Kind::kPair:
-    case Kind::kAsk:
+    case Kind::kBodyQuery:
     case Kind::kBatch:
       break;
   }
@@ -333,8 +333,8 @@ bool StepJoint(SpecifiedHull& hull, const Operation& operation, const FindSpecif
   switch (operation.kind) {
     case Kind::kPair:
       return StepPair(hull, operation, find);
-    case Kind::kAsk:
-      return StepAsk(hull, operation, find);
+    case Kind::kBodyQuery:
+      return StepBodyQuery(hull, operation, find);
     default:
       return StepBatch(operation, find);
   }
@@ -354,7 +354,7 @@ bool IsRead(const Operation& operation) {
     case Kind::kProbe:
     case Kind::kPair:
     case Kind::kGetBody:
-    case Kind::kAsk:
+    case Kind::kBodyQuery:
     case Kind::kBatch:
       return true;
   }

@@ -63,7 +63,7 @@ bool IsOfPiece(std::string_view message) {
 }
 
 // Returns true if a client's message parses a statement with this text.
-bool Asks(std::string_view message, std::string_view text) {
+bool IsQuery(std::string_view message, std::string_view text) {
   const std::string parsed = std::string(1, '\0').append(text).append(1, '\0');
   return message.front() == 'P' && message.find(parsed) != std::string_view::npos;
 }
@@ -166,9 +166,9 @@ uint64_t CuttingProxy::answered_bytes() {
   return answered_bytes_;
 }
 
-int CuttingProxy::Asked(const std::string& text) {
+int CuttingProxy::QueryCount(const std::string& text) {
   const std::lock_guard lock(mutex_);
-  return asked_[text];
+  return query_counts_[text];
 }
 
 void CuttingProxy::Accept() {
@@ -233,7 +233,7 @@ void CuttingProxy::NoteQuery(Connection& connection, std::string& message) {
   constexpr size_t kStart = 5;
   const std::string text = message.substr(kStart, message.size() - kStart - 1);
   const std::lock_guard lock(mutex_);
-  ++asked_[text];
+  ++query_counts_[text];
   if (!text.starts_with("LISTEN ")) return;
   connection.listens = true;
   if (refuses_to_listen_) message[kStart] = 'X';
@@ -262,8 +262,8 @@ bool CuttingProxy::PassRequests(Connection& connection) {
 }
 
 bool CuttingProxy::PassRequest(Connection& connection, const std::string& message) {
-  if (Asks(message, "BEGIN") && CutsHere(Cut::kHold)) connection.holding = true;
-  if (Asks(message, "COMMIT") && CutsHere(Cut::kBeforeCommit)) return false;
+  if (IsQuery(message, "BEGIN") && CutsHere(Cut::kHold)) connection.holding = true;
+  if (IsQuery(message, "COMMIT") && CutsHere(Cut::kBeforeCommit)) return false;
   const bool is_kept = connection.holding || !connection.piece.empty() || IsNext(Cut::kHoldCommit);
   if (is_kept && IsOfPiece(message)) return PassPiece(connection, message);
   return SendAll(connection.server, message);
@@ -272,8 +272,8 @@ bool CuttingProxy::PassRequest(Connection& connection, const std::string& messag
 // The contents decide if a piece is held, so it is buffered until its end.
 bool CuttingProxy::PassPiece(Connection& connection, const std::string& message) {
   connection.piece += message;
-  connection.begins = connection.begins || Asks(message, "BEGIN");
-  connection.commits = connection.commits || Asks(message, "COMMIT");
+  connection.begins = connection.begins || IsQuery(message, "BEGIN");
+  connection.commits = connection.commits || IsQuery(message, "COMMIT");
   if (message.front() != kEndOfPiece) return true;
   const std::string piece = std::exchange(connection.piece, {});
   const bool begins = std::exchange(connection.begins, false);

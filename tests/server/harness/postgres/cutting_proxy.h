@@ -55,7 +55,7 @@ class CuttingProxy {
   void RefuseToListen();
   // Bytes that the server has sent so far, and the number of queries with this text.
   uint64_t answered_bytes();
-  int Asked(const std::string& text);
+  int QueryCount(const std::string& text);
   // Delivers the held piece to the server. Returns after the server has answered all of it or
   // closed the connection.
   void Deliver();
@@ -92,7 +92,7 @@ class CuttingProxy {
   int cuts_ = 0;
   uint64_t answered_bytes_ = 0;
   // Simple queries, by text.
-  std::map<std::string, int> asked_;
+  std::map<std::string, int> query_counts_;
   std::string held_;
   int held_server_ = -1;
   std::condition_variable is_held_;

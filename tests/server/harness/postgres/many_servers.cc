@@ -173,7 +173,8 @@ void ManyServersTest::Run(const Calls& calls, const std::vector<Fault>& faults,
     HistoryClient last(Connect(i), history, "last", i);
     for (const std::string& body : calls.bodies) {
       EXPECT_TRUE(last.GetBody(body)) << "server " << i << " does not answer, seed " << calls.seed;
-      EXPECT_TRUE(last.Ask(body)) << "server " << i << " does not answer, seed " << calls.seed;
+      EXPECT_TRUE(last.QueryBody(body))
+          << "server " << i << " does not answer, seed " << calls.seed;
     }
     if (calls.several) {
       EXPECT_TRUE(last.ListHulls(calls.hulls) && last.Batch(calls.hulls, calls.bodies))

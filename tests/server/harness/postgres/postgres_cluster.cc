@@ -170,7 +170,7 @@ PostgresCluster::PostgresCluster(const WalIn& wal) {
     InitializeData({"--waldir", wal.directory, "--wal-segsize=1"});
   }
   Start();
-  Ask("postgres", absl::StrCat("CREATE ROLE hulld LOGIN PASSWORD '", kPassword, "'"));
+  RunSql("postgres", absl::StrCat("CREATE ROLE hulld LOGIN PASSWORD '", kPassword, "'"));
 }
 
 PostgresCluster::PostgresCluster(const StandbyOf& standby) {
@@ -189,17 +189,17 @@ void PostgresCluster::Follow(PostgresCluster& primary) {
            directory_ + "/basebackup.log");
   Start();
   // Set after the copy, which must not wait for a standby when promoted.
-  primary.Ask("postgres", "ALTER SYSTEM SET synchronous_standby_names = 'standby'");
-  primary.Ask("postgres", "SELECT pg_reload_conf()");
+  primary.RunSql("postgres", "ALTER SYSTEM SET synchronous_standby_names = 'standby'");
+  primary.RunSql("postgres", "SELECT pg_reload_conf()");
   const std::string is_followed = "SELECT 1 FROM pg_stat_replication WHERE sync_state = 'sync'";
-  for (int attempt = 0; primary.Ask("postgres", is_followed).empty(); ++attempt) {
+  for (int attempt = 0; primary.RunSql("postgres", is_followed).empty(); ++attempt) {
     if (attempt == kMaxAttempts) Fail(Contents(directory_ + "/server.log"));
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
 }
 
 void PostgresCluster::Promote() {
-  if (Ask("postgres", "SELECT pg_promote()").front() != "t") Fail("the standby is not promoted");
+  if (RunSql("postgres", "SELECT pg_promote()").front() != "t") Fail("the standby is not promoted");
 }
 
 PostgresCluster::~PostgresCluster() {
@@ -267,7 +267,8 @@ void PostgresCluster::Resume() {
 
 std::string PostgresCluster::MakeDatabase(const std::string& tablespace) {
   const std::string name = absl::StrCat("test_", ++databases_);
-  Ask("postgres", absl::StrCat("CREATE DATABASE ", name, " OWNER hulld TABLESPACE ", tablespace));
+  RunSql("postgres",
+         absl::StrCat("CREATE DATABASE ", name, " OWNER hulld TABLESPACE ", tablespace));
   return name;
 }
 
@@ -294,8 +295,8 @@ std::string PostgresCluster::WriteConninfo(const std::string& database, const st
   return path;
 }
 
-std::vector<std::string> PostgresCluster::Ask(const std::string& database,
-                                              const std::string& sql) const {
+std::vector<std::string> PostgresCluster::RunSql(const std::string& database,
+                                                 const std::string& sql) const {
   PGconn* const connection = PQconnectdb(absl::StrCat("host=", directory_, " dbname=", database,
                                                       " user=postgres password=", kAdminPassword)
                                              .c_str());

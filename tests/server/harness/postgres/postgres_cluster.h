@@ -50,7 +50,7 @@ class PostgresCluster {
   static constexpr char kPassword[] = "Wort-der-Rolle-7f";
 
   // Runs statements as a superuser; returns the first column of the last one's rows.
-  std::vector<std::string> Ask(const std::string& database, const std::string& sql) const;
+  std::vector<std::string> RunSql(const std::string& database, const std::string& sql) const;
 
   // Locks an existing table until the returned handle is destroyed; its readers wait.
   std::shared_ptr<void> HoldTable(const std::string& database, const std::string& table) const;

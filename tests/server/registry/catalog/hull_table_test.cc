@@ -80,8 +80,8 @@ TEST_F(HullTableTest, AHullReturnsFromRestUnchanged) {
   }
   GoRound();
   EXPECT_FALSE(IsAwake("a"));
-  const HullChange told = table_.entries().find("a")->second.Describe("a");
-  EXPECT_EQ(told.box.high, Vector(4, 5, 6));
+  const HullChange described = table_.entries().find("a")->second.Describe("a");
+  EXPECT_EQ(described.box.high, Vector(4, 5, 6));
   const auto again = table_.Find("a");
   EXPECT_EQ(again->committed(), stored);
   EXPECT_EQ(again->Describe().box.low, Vector(1, 2, 3));
@@ -195,7 +195,7 @@ TEST_F(HullTableTest, AnIdleLargeHullStaysAwake) {
   EXPECT_TRUE(IsAwake("x"));
 }
 
-TEST_F(HullTableTest, ManyIdleHullsComeToRestOverSeveralHolds) {
+TEST_F(HullTableTest, ManyIdleHullsComeToRestOverSeveralCriticalSections) {
   constexpr int kHulls = 300;
   for (int i = 0; i < kHulls; ++i) Cube("h" + std::to_string(i));
   PassTime();
@@ -203,7 +203,7 @@ TEST_F(HullTableTest, ManyIdleHullsComeToRestOverSeveralHolds) {
   EXPECT_LE(mutex_.Statistics().max_lookups, kMaxLookupsPerHold);
 }
 
-TEST_F(HullTableTest, AHullThatWasInUseForLongRestsAfterwards) {
+TEST_F(HullTableTest, AHullComesToRestAfterLongUse) {
   auto used = Cube("a");
   for (int i = 0; i < 3; ++i) PassTime();
   EXPECT_TRUE(IsAwake("a"));
@@ -299,14 +299,14 @@ TEST_F(HullTableTest, AnIdleBoxTakesLessThan600Bytes) {
 TEST_F(HullTableTest, AChangedHullRestsAfterManyLaterOnesUnlessItIsLookedUp) {
   const auto change = [this](const std::string& id) { table_.RestSoon(locked_, *Cube(id)); };
   change("first");
-  change("asked");
-  EXPECT_NE(table_.Find("asked"), nullptr);
+  change("read");
+  EXPECT_NE(table_.Find("read"), nullptr);
   for (size_t i = 0; i < HullTable::kMaxJustChanged; ++i) {
     EXPECT_TRUE(IsAwake("first") || i + 2 >= HullTable::kMaxJustChanged) << i;
     change("later/" + std::to_string(i));
   }
   EXPECT_FALSE(IsAwake("first"));
-  EXPECT_TRUE(IsAwake("asked"));
+  EXPECT_TRUE(IsAwake("read"));
   EXPECT_TRUE(IsAwake("later/0"));
 }
 

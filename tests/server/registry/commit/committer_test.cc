@@ -159,7 +159,7 @@ class CommitterTest : public ::testing::Test {
         [this, revision, ended](Locked& later, const absl::Status& status, const Change&) {
           EXPECT_TRUE(later.Holds(order_));
           outcomes_.emplace_back(revision, status.code());
-          later.Afterwards([ended] { ended->set_value(); });
+          later.Defer([ended] { ended->set_value(); });
         });
     return ended->get_future();
   }
@@ -265,18 +265,18 @@ TEST_F(CommitterTest, ChangesSubmittedByACompletionSurviveTheRefusalOfItsBatch) 
   EXPECT_FALSE(committer_.Statistics().failing);
 }
 
-TEST_F(CommitterTest, AStoreThatRecoveredNoLongerFails) {
+TEST_F(CommitterTest, ARecoveredStoreNoLongerFails) {
   GatedStore::Gate gate;
   store_.Close(gate);
   gate.outcome.set_value(absl::UnavailableError("no disk"));
   Submit(1).wait();
   EXPECT_TRUE(committer_.Statistics().failing);
-  std::promise<absl::Status> told;
+  std::promise<absl::Status> done;
   {
     const Locked locked(order_);
-    committer_.AddBarrier([&](Locked&, const absl::Status& status) { told.set_value(status); });
+    committer_.AddBarrier([&](Locked&, const absl::Status& status) { done.set_value(status); });
   }
-  EXPECT_TRUE(told.get_future().get().ok());
+  EXPECT_TRUE(done.get_future().get().ok());
   EXPECT_FALSE(committer_.Statistics().failing);
   Submit(2).wait();
   EXPECT_EQ(store_.recoveries(), 1);
@@ -396,12 +396,12 @@ TEST(Committer, FollowersReceiveChangesFoundLater) {
   Committer committer(store, order);
   committer.SetPeers(peers);
   const auto follow = [&] {
-    std::promise<absl::Status> told;
+    std::promise<absl::Status> done;
     {
       const Locked locked(order);
-      committer.AddBarrier([&](Locked&, const absl::Status& status) { told.set_value(status); });
+      committer.AddBarrier([&](Locked&, const absl::Status& status) { done.set_value(status); });
     }
-    return told.get_future().get();
+    return done.get_future().get();
   };
   EXPECT_TRUE(follow().ok());
   EXPECT_EQ(store.fetches, 1);
@@ -415,7 +415,7 @@ TEST(Committer, AReadBarrierIsSentByItsCallerAndNotSharedWithLaterOnes) {
   FairMutex order;
   // Guarded by order.
   std::vector<std::string> events;
-  std::promise<void> told_later;
+  std::promise<void> done_later;
   std::promise<void> committed;
   RecordedPeers peers;
   Committer committer(store, order);
@@ -434,7 +434,7 @@ TEST(Committer, AReadBarrierIsSentByItsCallerAndNotSharedWithLaterOnes) {
     Locked locked(order);
     committer.StartBarrier(locked, [&, note](Locked& later, const absl::Status& status) {
       note("later")(later, status);
-      told_later.set_value();
+      done_later.set_value();
     });
     committer.Submit(locked, Change(), [&](Locked& later, const absl::Status& status, Change&) {
       note("committed")(later, status);
@@ -444,18 +444,18 @@ TEST(Committer, AReadBarrierIsSentByItsCallerAndNotSharedWithLaterOnes) {
   // The committer's thread may not be waiting yet: then it sends the request itself.
   constexpr int kMaxTries = 100'000;
   for (int i = 0; i < kMaxTries && store.starts == 0; ++i) {
-    std::promise<void> told;
+    std::promise<void> done;
     {
       Locked locked(order);
       committer.StartBarrier(locked, [&](Locked& later, const absl::Status& status) {
         if (store.starts > 0) note("first")(later, status);
-        told.set_value();
+        done.set_value();
       });
     }
-    told.get_future().wait();
+    done.get_future().wait();
   }
   ASSERT_GT(store.starts, 0);
-  told_later.get_future().wait();
+  done_later.get_future().wait();
   committed.get_future().wait();
   const std::lock_guard lock(order);
   ASSERT_THAT(events, SizeIs(3));
@@ -486,12 +486,12 @@ TEST(Committer, GrowthIsFetchedAfterPeerChangesAreKnown) {
   const auto follow = [&] {
     store.found_by_fetch.revision = 7;
     for (const char* id : {"wanted", "unreadable", "other"}) store.found_by_fetch.by_id[id];
-    std::promise<void> told;
+    std::promise<void> done;
     {
       const Locked locked(order);
-      committer.AddBarrier([&](Locked&, const absl::Status&) { told.set_value(); });
+      committer.AddBarrier([&](Locked&, const absl::Status&) { done.set_value(); });
     }
-    told.get_future().get();
+    done.get_future().get();
     const std::lock_guard lock(order);
     return std::exchange(events, {});
   };

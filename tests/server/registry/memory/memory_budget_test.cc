@@ -22,7 +22,7 @@ class MemoryBudgetTest : public ::testing::Test {
   struct Owner {
     Owner(MemoryBudgetTest& test, int owner_number, uint64_t in_use_bytes = 0)
         : number(owner_number), in_use(in_use_bytes), account(test.budget_, [this, &test](Locked&) {
-            test.asked_.push_back(number);
+            test.evictions_.push_back(number);
             account.Set(in_use, false);
           }) {}
     const int number;
@@ -45,7 +45,7 @@ class MemoryBudgetTest : public ::testing::Test {
   FairMutex owners_;
   MemoryBudget budget_{100, 40, owners_};
   // Numbers of the owners asked to evict, in order.
-  std::vector<int> asked_;
+  std::vector<int> evictions_;
 };
 
 TEST_F(MemoryBudgetTest, CountsAccountsAndCharges) {
@@ -70,7 +70,7 @@ TEST_F(MemoryBudgetTest, NothingIsEvictedWithinTheLimit) {
   owner.account.Set(100, false);
   Evict();
   EXPECT_TRUE(Check(MemoryUse::kWriting).ok());
-  EXPECT_THAT(asked_, ElementsAre());
+  EXPECT_THAT(evictions_, ElementsAre());
 }
 
 TEST_F(MemoryBudgetTest, TheLeastRecentlyUsedIsEvictedFirstAndNoMoreThanNeeded) {
@@ -80,25 +80,25 @@ TEST_F(MemoryBudgetTest, TheLeastRecentlyUsedIsEvictedFirstAndNoMoreThanNeeded) 
   for (Owner* owner : {&a, &b, &c}) owner->account.Set(50, false);
   a.account.Set(50, false);
   Evict();
-  EXPECT_THAT(asked_, ElementsAre(2));
+  EXPECT_THAT(evictions_, ElementsAre(2));
   EXPECT_EQ(bytes(), 100);
   EXPECT_EQ(budget_.Statistics().evictions, 1);
 }
 
-TEST_F(MemoryBudgetTest, ItemsInUseStayAndAreTriedAgain) {
+TEST_F(MemoryBudgetTest, AccountsInUseStayAndAreVisitedAgain) {
   Owner busy(*this, 1, 60);
   Owner idle(*this, 2);
   busy.account.Set(60, false);
   idle.account.Set(60, false);
   Evict();
-  EXPECT_THAT(asked_, ElementsAre(1, 2));
+  EXPECT_THAT(evictions_, ElementsAre(1, 2));
   EXPECT_EQ(bytes(), 60);
   EXPECT_EQ(budget_.Statistics().evictions, 1);
   // It has grown since it was counted.
   busy.in_use = 110;
   MemoryCharge charge(budget_, MemoryUse::kReading, 50);
   Evict();
-  EXPECT_THAT(asked_, ElementsAre(1, 2, 1));
+  EXPECT_THAT(evictions_, ElementsAre(1, 2, 1));
   EXPECT_EQ(bytes(), 160);
   busy.in_use = 0;
   Evict();
@@ -106,7 +106,7 @@ TEST_F(MemoryBudgetTest, ItemsInUseStayAndAreTriedAgain) {
 }
 
 // An owner that cannot evict is asked again only after all others; one eviction asks only a few.
-TEST_F(MemoryBudgetTest, AnEvictionTriesABoundedNumber) {
+TEST_F(MemoryBudgetTest, AnEvictionVisitsABoundedNumberOfAccounts) {
   std::vector<std::unique_ptr<Owner>> owners;
   for (int i = 0; i < 200; ++i) {
     owners.push_back(std::make_unique<Owner>(*this, i, i < 150 ? 1 : 0));
@@ -114,7 +114,7 @@ TEST_F(MemoryBudgetTest, AnEvictionTriesABoundedNumber) {
   }
   const MemoryCharge charge(budget_, MemoryUse::kWriting, 50);
   Evict();
-  EXPECT_EQ(asked_.size(), MemoryBudget::kMaxVisited);
+  EXPECT_EQ(evictions_.size(), MemoryBudget::kMaxVisited);
   EXPECT_EQ(bytes(), 250);
   for (int i = 0; i < 3; ++i) Evict();
   EXPECT_EQ(bytes(), 200);
@@ -193,7 +193,7 @@ TEST_F(MemoryBudgetTest, AgedAccountsAreEvictedFirstAndTouchedOnesLast) {
   owners[3]->account.Age();
   const MemoryCharge charge(budget_, MemoryUse::kReading, 100);
   Evict();
-  EXPECT_THAT(asked_, ElementsAre(3, 1, 2, 0));
+  EXPECT_THAT(evictions_, ElementsAre(3, 1, 2, 0));
 }
 
 }  // namespace memory_budget_test

@@ -110,7 +110,7 @@ void SharedStore::NotePeerChanges() {
     PeerChange& other = known_.peer_changes.by_id[logged.hull_id];
     other.revision = logged.revision;
     other.ended_at = std::max(other.ended_at, logged.ended_at);
-    if (!other.former.has_value()) other.former = logged.former;
+    if (!other.previous.has_value()) other.previous = logged.previous;
     other.hull.reset();
     other.body.reset();
     const auto body = database_.bodies_.find(logged.hull_id);

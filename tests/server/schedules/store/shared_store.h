@@ -32,13 +32,13 @@ class SharedStore : public Store, public PeerFeed {
   absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull& hull) override;
   absl::StatusOr<uint64_t> LoadSequence(const HullRecord& hull,
                                         const std::string& writer_id) override;
-  bool finds_records() const override { return database_.finds_records(); }
+  bool supports_lookup() const override { return database_.supports_lookup(); }
   absl::StatusOr<FoundRecords> FindRecords(std::span<const std::string> ids) override {
     return database_.FindRecords(ids);
   }
   absl::StatusOr<FoundRecords> ListRecords(const std::string& prefix, const std::string& after,
-                                           size_t most, RecordKinds kinds) override {
-    return database_.ListRecords(prefix, after, most, kinds);
+                                           size_t limit, RecordKinds kinds) override {
+    return database_.ListRecords(prefix, after, limit, kinds);
   }
   StoreTotals totals() const override { return known_.totals; }
   absl::Status Commit(std::span<Change* const> changes) override;

@@ -87,7 +87,7 @@ absl::StatusOr<FoundRecords> SimulatedStore::FindRecords(std::span<const std::st
 }
 
 absl::StatusOr<FoundRecords> SimulatedStore::ListRecords(const std::string& prefix,
-                                                         const std::string& after, size_t most,
+                                                         const std::string& after, size_t limit,
                                                          RecordKinds kinds) {
   // All of them in one step.
   absl::StatusOr<FoundRecords> found = FindRecords({});
@@ -102,7 +102,7 @@ absl::StatusOr<FoundRecords> SimulatedStore::ListRecords(const std::string& pref
     const bool has_hull = kinds.hulls && kept != hulls_.end();
     const bool has_body = kinds.bodies && body != bodies_.end();
     if ((!has_hull && !has_body) || !id.starts_with(prefix) || id <= after) continue;
-    found->more = listed == most;
+    found->more = listed == limit;
     if (found->more) break;
     ++listed;
     if (has_hull) found->hulls.emplace(id, kept->second.stored);
@@ -209,7 +209,7 @@ void SimulatedStore::KeepBody(const Change& change) {
   Logged logged = {record.body_id, change.revision};
   if (change.deleted) {
     logged.ended_at = change.revision;
-    if (record.create_revision != 0) logged.former = Incarnation::Of(record);
+    if (record.create_revision != 0) logged.previous = Incarnation::Of(record);
   }
   log_.push_back(std::move(logged));
   if (change.deleted) {
@@ -227,7 +227,7 @@ void SimulatedStore::Keep(const Change& change, bool nobody_waits) {
   if (change.deleted || change.replaced.has_value()) {
     const HullRecord& ended = change.deleted ? record : change.replaced->record;
     logged.ended_at = change.revision;
-    if (ended.create_revision != 0) logged.former = Incarnation::Of(ended);
+    if (ended.create_revision != 0) logged.previous = Incarnation::Of(ended);
   }
   log_.push_back(std::move(logged));
   if (change.deleted) {

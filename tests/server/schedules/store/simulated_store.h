@@ -68,17 +68,17 @@ class SimulatedStore : public Store {
   absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull& hull) override;
   absl::StatusOr<uint64_t> LoadSequence(const HullRecord& hull,
                                         const std::string& writer_id) override;
-  bool finds_records() const override { return finds_records_; }
+  bool supports_lookup() const override { return finds_records_; }
   absl::StatusOr<FoundRecords> FindRecords(std::span<const std::string> ids) override;
   absl::StatusOr<FoundRecords> ListRecords(const std::string& prefix, const std::string& after,
-                                           size_t most, RecordKinds kinds) override;
+                                           size_t limit, RecordKinds kinds) override;
   StoreTotals totals() const override;
   absl::Status Commit(std::span<Change* const> changes) override;
   absl::Status Recover() override;
   absl::StatusOr<std::string> MakeCopy() override;
 
   // Call before use.
-  void SetFindsRecords(bool finds_records) { finds_records_ = finds_records; }
+  void SetFindsRecords(bool supports_lookup) { finds_records_ = supports_lookup; }
   Ledger& ledger() { return ledger_; }
   const Counts& counts() const { return counts_; }
   // Failures that may have been reported to calls by now; the second also counts one still in
@@ -112,7 +112,7 @@ class SimulatedStore : public Store {
     std::string hull_id;
     uint64_t revision = 0;
     uint64_t ended_at = 0;
-    std::optional<Incarnation> former = {};
+    std::optional<Incarnation> previous = {};
   };
 
   absl::Status RefuseBatch(std::span<const Change* const> changes);

@@ -23,8 +23,8 @@ std::atomic<std::binary_semaphore*> reading = nullptr;
 
 // Replaces the C library's function.
 extern "C" int eventfd_read(int fd, eventfd_t* value) {
-  if (std::binary_semaphore* const told = reading.exchange(nullptr); told != nullptr) {
-    told->release();
+  if (std::binary_semaphore* const semaphore = reading.exchange(nullptr); semaphore != nullptr) {
+    semaphore->release();
     pollfd source = {fd, POLLIN, 0};
     poll(&source, 1, -1);
   }
@@ -40,10 +40,10 @@ TEST(BatchNotices, EndDuringTheResetOfTheWakeup) {
   if (!PostgresCluster::IsInstalled()) GTEST_SKIP() << PostgresCluster::kMissing;
   PostgresCluster& cluster = PostgresCluster::Shared();
   const std::string database = cluster.MakeDatabase();
-  cluster.Ask(database,
-              "CREATE SCHEMA hulld; CREATE TABLE hulld.store (batch bigint); "
-              "INSERT INTO hulld.store VALUES (7); GRANT USAGE ON SCHEMA hulld TO hulld; "
-              "GRANT SELECT ON hulld.store TO hulld");
+  cluster.RunSql(database,
+                 "CREATE SCHEMA hulld; CREATE TABLE hulld.store (batch bigint); "
+                 "INSERT INTO hulld.store VALUES (7); GRANT USAGE ON SCHEMA hulld TO hulld; "
+                 "GRANT SELECT ON hulld.store TO hulld");
   const absl::StatusOr<Conninfo> conninfo = ParseConninfo(cluster.Conninfo(database));
   ASSERT_TRUE(conninfo.ok());
   std::binary_semaphore is_reading{0};

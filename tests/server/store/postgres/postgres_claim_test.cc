@@ -77,15 +77,15 @@ TEST_F(PostgresClaim, AnIdleServerNoticesThatItWasSuperseded) {
 TEST_F(PostgresClaim, AServerWaitsUntilTheActiveOneEnds) {
   Start();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
-  std::promise<void> asked;
-  bool told = false;
+  std::promise<void> queried;
+  bool was_queried = false;
   options_.should_stop = [&] {
-    if (!std::exchange(told, true)) asked.set_value();
+    if (!std::exchange(was_queried, true)) queried.set_value();
     return false;
   };
   auto next = std::async(std::launch::async, [this] { return Open(); });
   // The server found the store claimed.
-  asked.get_future().get();
+  queried.get_future().get();
   EXPECT_TRUE(hulls_->Put("h", {{9, 9, 9}}).ok());
   hulls_ = nullptr;
   absl::StatusOr<std::unique_ptr<PostgresStore>> store = next.get();
@@ -119,7 +119,7 @@ TEST_F(PostgresClaim, AServerReclaimsALostLock) {
   const uint64_t epoch = hulls_->store().epoch();
   EndSessions(kHasLock);
   // Bounded only by the time limit of the test.
-  while (Ask(absl::StrCat("SELECT 1 FROM pg_stat_activity WHERE ", kHasLock)).empty()) {
+  while (RunSql(absl::StrCat("SELECT 1 FROM pg_stat_activity WHERE ", kHasLock)).empty()) {
     std::this_thread::yield();
   }
   EXPECT_TRUE(hulls_->Put("h", CubeCorners()).ok());
@@ -127,7 +127,7 @@ TEST_F(PostgresClaim, AServerReclaimsALostLock) {
 }
 
 TEST_F(PostgresClaim, WithoutSyncAnUncleanStoreGetsANewId) {
-  Ask("ALTER ROLE hulld SET synchronous_commit = off");
+  RunSql("ALTER ROLE hulld SET synchronous_commit = off");
   Start();
   EXPECT_EQ(hulls_->store().durability(), Durability::kRelaxed);
   const std::string id = hulls_->store().id();
@@ -137,7 +137,7 @@ TEST_F(PostgresClaim, WithoutSyncAnUncleanStoreGetsANewId) {
   options_.take_over = true;
   Start();
   EXPECT_NE(hulls_->store().id(), id);
-  Ask("ALTER ROLE hulld RESET synchronous_commit");
+  RunSql("ALTER ROLE hulld RESET synchronous_commit");
   Start();
   EXPECT_EQ(hulls_->store().durability(), Durability::kSync);
 }
@@ -147,7 +147,7 @@ TEST_F(PostgresClaim, ARestoredDatabaseGetsANewId) {
   const std::string id = hulls_->store().id();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
   // Simulates a failover to a standby that lagged behind.
-  Ask("UPDATE hulld.store SET batch = batch - 1");
+  RunSql("UPDATE hulld.store SET batch = batch - 1");
   EndSessions("true");
   EXPECT_TRUE(absl::IsUnavailable(hulls_->Put("h", {{9, 9, 9}}).status()));
   Start();
@@ -167,7 +167,7 @@ TEST_F(PostgresClaim, AWrongPasswordIsReportedAndNotShown) {
 }
 
 TEST_F(PostgresClaim, ARoleWithoutRightsGetsAnErrorThatNamesTheGrant) {
-  Ask("CREATE ROLE stranger LOGIN PASSWORD 'fremd'");
+  RunSql("CREATE ROLE stranger LOGIN PASSWORD 'fremd'");
   options_.conninfo = absl::StrCat("host=", proxy_->directory(), " dbname=", database_,
                                    " user=stranger password=fremd");
   const absl::Status status = Open().status();

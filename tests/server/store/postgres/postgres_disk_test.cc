@@ -37,8 +37,8 @@ class PostgresDisk : public ::testing::TestWithParam<bool> {
     if (!machine_->log.is_mounted() || !machine_->tables.is_mounted()) return;
     machine_->cluster =
         std::make_unique<PostgresCluster>(PostgresCluster::WalIn{machine_->log.directory()});
-    cluster().Ask("postgres", absl::StrCat("CREATE TABLESPACE small LOCATION '",
-                                           machine_->tables.directory(), "'"));
+    cluster().RunSql("postgres", absl::StrCat("CREATE TABLESPACE small LOCATION '",
+                                              machine_->tables.directory(), "'"));
   }
   static void TearDownTestSuite() { delete std::exchange(machine_, nullptr); }
   static PostgresCluster& cluster() { return *machine_->cluster; }
@@ -135,7 +135,7 @@ TEST_P(PostgresDisk, AFullTablespaceIsReportedAndTheChangeRolledBack) {
 
 // PostgreSQL ends all its processes and recovers. If recovery needs space as well, it shuts down.
 TEST_P(PostgresDisk, AFullLogDiskLosesNothing) {
-  options_.patience = std::chrono::milliseconds(500);
+  options_.retry_timeout = std::chrono::milliseconds(500);
   Start("pg_default");
   ASSERT_TRUE(PutNext().ok());
   machine_->log.Fill();

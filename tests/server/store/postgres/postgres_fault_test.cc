@@ -25,12 +25,12 @@ class PostgresFault : public PostgresTest {
 TEST_F(PostgresFault, ACommitWithALostAnswerIsFoundAndNotRepeated) {
   Start();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
-  const std::string batches = Ask("SELECT batch FROM hulld.store").front();
+  const std::string batches = RunSql("SELECT batch FROM hulld.store").front();
   proxy_->CutNext(Cut::kAfterCommit);
   const auto put = hulls_->Put("h", {{9, 9, 9}});
   ASSERT_TRUE(put.ok()) << put.status();
   EXPECT_EQ(proxy_->cuts(), 1);
-  EXPECT_EQ(Ask(absl::StrCat("SELECT batch - ", batches, " FROM hulld.store")).front(), "1");
+  EXPECT_EQ(RunSql(absl::StrCat("SELECT batch - ", batches, " FROM hulld.store")).front(), "1");
   EXPECT_EQ(Received(), 9);
   ASSERT_TRUE(hulls_->Put("h", {{10, 9, 9}}).ok());
   EXPECT_EQ(ReceivedAfterRestart("h"), 10);
@@ -54,16 +54,16 @@ TEST_F(PostgresFault, ALateTransactionChangesNothing) {
   ASSERT_TRUE(hulls_->Put("h", {{0.5, 0.5, 0.5}}).ok());
   EXPECT_EQ(proxy_->cuts(), 1);
   ASSERT_TRUE(hulls_->Put("h", {{0.25, 0.5, 0.5}}).ok());
-  const std::string before = Ask("SELECT s::text FROM hulld.store s").front();
+  const std::string before = RunSql("SELECT s::text FROM hulld.store s").front();
   proxy_->Deliver();
-  EXPECT_EQ(Ask("SELECT s::text FROM hulld.store s").front(), before);
+  EXPECT_EQ(RunSql("SELECT s::text FROM hulld.store s").front(), before);
   EXPECT_EQ(ReceivedAfterRestart("h"), 10);
   EXPECT_EQ(hulls_->Open("h")->last_sequence, 3);
 }
 
 // While the outcome cannot be determined, the error says so and further changes are refused.
 TEST_F(PostgresFault, AnUnknownOutcomeIsReported) {
-  options_.patience = std::chrono::milliseconds(0);
+  options_.retry_timeout = std::chrono::milliseconds(0);
   for (const Cut cut : {Cut::kBeforeCommit, Cut::kAfterCommit}) {
     const std::string id = cut == Cut::kAfterCommit ? "after" : "before";
     Start();
@@ -114,7 +114,7 @@ TEST_F(PostgresFault, WritersDoNotNoticeARestartOfTheDatabase) {
 }
 
 TEST_F(PostgresFault, AnUnreachableDatabaseRefusesOnlyChanges) {
-  options_.patience = std::chrono::milliseconds(50);
+  options_.retry_timeout = std::chrono::milliseconds(50);
   Start();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
   const HullView before = *hulls_->View("h");
@@ -129,8 +129,8 @@ TEST_F(PostgresFault, AnUnreachableDatabaseRefusesOnlyChanges) {
     proxy_->SetDown(false);
   }
   EXPECT_GT(hulls_->store().failures().write, 0);
-  // The stream continues without a restart. On a busy machine, a connection takes longer than the
-  // store's patience.
+  // The stream continues without a restart. On a busy machine, connecting takes longer than the
+  // store keeps trying.
   auto accepted = hulls_->Append(session, 2, {{9, 9, 9}});
   while (absl::IsUnavailable(accepted.status())) {
     accepted = hulls_->Append(session, 2, {{9, 9, 9}});
@@ -141,8 +141,8 @@ TEST_F(PostgresFault, AnUnreachableDatabaseRefusesOnlyChanges) {
 
 // The database neither answers nor closes its connections.
 TEST_F(PostgresFault, AHungDatabaseBlocksNoThreadForever) {
-  options_.answer_time = std::chrono::milliseconds(200);
-  options_.patience = std::chrono::milliseconds(100);
+  options_.answer_timeout = std::chrono::milliseconds(200);
+  options_.retry_timeout = std::chrono::milliseconds(100);
   options_.conninfo += " connect_timeout=2";
   Start();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
@@ -168,12 +168,12 @@ TEST_F(PostgresFault, AHungDatabaseBlocksNoThreadForever) {
 TEST_F(PostgresFault, ARefusedTransactionLeavesNothing) {
   Start();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
-  Ask("ALTER TABLE hulld.deltas ADD CONSTRAINT never CHECK (length(vertices) < 20) NOT VALID");
+  RunSql("ALTER TABLE hulld.deltas ADD CONSTRAINT never CHECK (length(vertices) < 20) NOT VALID");
   const absl::Status refused = hulls_->Put("h", {{9, 9, 9}}).status();
   EXPECT_TRUE(absl::IsUnavailable(refused));
   EXPECT_THAT(std::string(refused.message()), HasSubstr("nothing was changed"));
-  EXPECT_EQ(Ask("SELECT batch FROM hulld.store").front(), "2");
-  Ask("ALTER TABLE hulld.deltas DROP CONSTRAINT never");
+  EXPECT_EQ(RunSql("SELECT batch FROM hulld.store").front(), "2");
+  RunSql("ALTER TABLE hulld.deltas DROP CONSTRAINT never");
   EXPECT_TRUE(hulls_->Put("h", {{10, 9, 9}}).ok());
   EXPECT_EQ(ReceivedAfterRestart("h"), 9);
 }
@@ -182,12 +182,12 @@ TEST_F(PostgresFault, ARefusedTransactionLeavesNothing) {
 TEST_F(PostgresFault, ACancelledWaitForAStandbyIsNotAnAcknowledgement) {
   Start();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
-  Ask("ALTER SYSTEM SET synchronous_standby_names = 'nobody'");
-  Ask("SELECT pg_reload_conf()");
+  RunSql("ALTER SYSTEM SET synchronous_standby_names = 'nobody'");
+  RunSql("SELECT pg_reload_conf()");
   std::future<absl::StatusOr<ChunkResult>> put;
   const std::string waiting = "wait_event = 'SyncRep' AND datname = current_database()";
   const auto await = [&](const std::string& condition) {
-    while (Ask("SELECT 1 FROM pg_stat_activity WHERE " + condition).empty() &&
+    while (RunSql("SELECT 1 FROM pg_stat_activity WHERE " + condition).empty() &&
            put.wait_for(std::chrono::seconds(0)) == std::future_status::timeout) {
       std::this_thread::yield();
     }
@@ -199,16 +199,16 @@ TEST_F(PostgresFault, ACancelledWaitForAStandbyIsNotAnAcknowledgement) {
     ++puts;
     await(waiting);
   } while (put.wait_for(std::chrono::seconds(0)) == std::future_status::ready);
-  const std::string first = Ask("SELECT pid FROM pg_stat_activity WHERE " + waiting).front();
-  const std::string epoch = Ask("SELECT epoch FROM hulld.store").front();
-  Ask(absl::StrCat("SELECT pg_cancel_backend(", first, ")"));
+  const std::string first = RunSql("SELECT pid FROM pg_stat_activity WHERE " + waiting).front();
+  const std::string epoch = RunSql("SELECT epoch FROM hulld.store").front();
+  RunSql(absl::StrCat("SELECT pg_cancel_backend(", first, ")"));
   // A new session queries the outcome, which also waits for the standby.
   await(waiting + " AND pid <> " + first);
   EXPECT_EQ(put.wait_for(std::chrono::seconds(0)), std::future_status::timeout);
-  Ask("ALTER SYSTEM RESET synchronous_standby_names");
-  Ask("SELECT pg_reload_conf()");
+  RunSql("ALTER SYSTEM RESET synchronous_standby_names");
+  RunSql("SELECT pg_reload_conf()");
   EXPECT_TRUE(put.get().ok());
-  EXPECT_NE(Ask("SELECT epoch FROM hulld.store").front(), epoch);
+  EXPECT_NE(RunSql("SELECT epoch FROM hulld.store").front(), epoch);
   EXPECT_EQ(ReceivedAfterRestart("h"), 8 + puts);
 }
 

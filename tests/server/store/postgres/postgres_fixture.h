@@ -57,12 +57,13 @@ class PostgresTest : public ::testing::Test {
     const auto view = hulls_->View(hull_id);
     return view.ok() ? view->record.counts.received : 0;
   }
-  std::vector<std::string> Ask(const std::string& sql) const {
-    return cluster().Ask(database_, sql);
+  std::vector<std::string> RunSql(const std::string& sql) const {
+    return cluster().RunSql(database_, sql);
   }
   // Ends the sessions of hulld that satisfy `condition`.
   void EndSessions(const std::string& condition) const {
-    Ask("SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE usename = 'hulld' AND "
+    RunSql(
+        "SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE usename = 'hulld' AND "
         "datname = current_database() AND " +
         condition);
   }

@@ -201,7 +201,7 @@ TEST_F(PostgresFollow, AHullWithANewBaseIsReadAgain) {
   StartWithHull(1000);
   // Larger than its base.
   ASSERT_TRUE(other_->Put("h", SpherePoints(3500, 2)).ok());
-  ASSERT_EQ(Ask("SELECT count(*) FROM hulld.deltas").front(), "0");
+  ASSERT_EQ(RunSql("SELECT count(*) FROM hulld.deltas").front(), "0");
   ASSERT_TRUE(hulls_->View("h").ok());
   EXPECT_EQ(hulls_->registry().Cache().loads, 2);
   EXPECT_EQ(hulls_->registry().Cache().grown, 0);
@@ -212,7 +212,7 @@ TEST_F(PostgresFollow, AHullThatGrewMuchIsReadAgain) {
   FollowWhenCalled();
   StartWithHull(20'000);
   ASSERT_TRUE(other_->Put("h", SpherePoints(4097, 2)).ok());
-  ASSERT_EQ(Ask("SELECT count(*) FROM hulld.deltas").front(), "1");
+  ASSERT_EQ(RunSql("SELECT count(*) FROM hulld.deltas").front(), "1");
   ASSERT_TRUE(hulls_->View("h").ok());
   EXPECT_EQ(hulls_->registry().Cache().loads, 2);
   EXPECT_EQ(hulls_->registry().Cache().grown, 0);
@@ -223,7 +223,7 @@ TEST_F(PostgresFollow, DamagedDeltasAreDetected) {
   FollowWhenCalled();
   StartWithHull(1000);
   ASSERT_TRUE(other_->Put("h", {PointOutside(0)}).ok());
-  Ask("UPDATE hulld.deltas SET vertices = set_byte(vertices, 0, get_byte(vertices, 0) # 1)");
+  RunSql("UPDATE hulld.deltas SET vertices = set_byte(vertices, 0, get_byte(vertices, 0) # 1)");
   EXPECT_TRUE(absl::IsDataLoss(hulls_->View("h").status()));
   EXPECT_EQ(hulls_->registry().Cache().grown, 0);
 }
@@ -246,10 +246,10 @@ TEST_F(PostgresFollow, AServerThatLagsTooFarBehindStops) {
   FollowWhenCalled();
   Start();
   const auto change = [&](int count) {
-    Ask(absl::StrCat("UPDATE hulld.store SET batch = batch + 1, revision = revision + ", count,
-                     "; INSERT INTO hulld.changes SELECT batch, 'h' || n, revision - ", count,
-                     " + n, revision - ", count, " + n FROM hulld.store, generate_series(1, ",
-                     count, ") n"));
+    RunSql(absl::StrCat("UPDATE hulld.store SET batch = batch + 1, revision = revision + ", count,
+                        "; INSERT INTO hulld.changes SELECT batch, 'h' || n, revision - ", count,
+                        " + n, revision - ", count, " + n FROM hulld.store, generate_series(1, ",
+                        count, ") n"));
   };
   bool ended = false;
   hulls_->store().OnEnded([&] { ended = true; });
@@ -320,7 +320,7 @@ TEST_F(PostgresFollow, ANoticeOfABatchTriggersAReadImmediately) {
     ASSERT_TRUE(here.Reports(id)) << i;
     ASSERT_TRUE(there.Reports(id)) << i;
   }
-  EXPECT_EQ(proxy_->Asked(kPoll), 1);
+  EXPECT_EQ(proxy_->QueryCount(kPoll), 1);
 }
 
 TEST_F(PostgresFollow, WithoutNoticesServersPoll) {
@@ -342,13 +342,14 @@ TEST_F(PostgresFollow, ALostListeningSessionIsReopened) {
   {
     Watcher watcher(hulls_->registry());
     for (int i = 1; i <= 3; ++i) {
-      const int listened = proxy_->Asked("LISTEN hulld_batches");
+      const int listened = proxy_->QueryCount("LISTEN hulld_batches");
       EXPECT_GE(listened, i);
       proxy_->CutListeners();
       const std::string id = absl::StrCat("h", i);
       ASSERT_TRUE(other_->Create(id).ok());
       EXPECT_TRUE(watcher.Reports(id));
-      ASSERT_TRUE(BecomesTrue([&] { return proxy_->Asked("LISTEN hulld_batches") > listened; }));
+      ASSERT_TRUE(
+          BecomesTrue([&] { return proxy_->QueryCount("LISTEN hulld_batches") > listened; }));
     }
   }
   EndAll();
@@ -366,8 +367,8 @@ TEST_F(PostgresFollow, AServerWithoutNoticesPollsMoreOften) {
   Start();
   other_ = StartPeer();
   auto watcher = std::make_unique<Watcher>(hulls_->registry());
-  const auto polls = [&] { return proxy_->Asked(kPoll); };
-  const auto heartbeats = [&] { return proxy_->Asked("SELECT owner FROM hulld.store"); };
+  const auto polls = [&] { return proxy_->QueryCount(kPoll); };
+  const auto heartbeats = [&] { return proxy_->QueryCount("SELECT owner FROM hulld.store"); };
   ASSERT_TRUE(other_->Create("heard").ok());
   ASSERT_TRUE(watcher->Reports("heard"));
   proxy_->WithholdNotices(true);
@@ -408,11 +409,11 @@ TEST_F(PostgresFollow, ServersPollIfTheDatabaseRefusesToListen) {
   }
   EndAll();
   const std::string text = log.text();
-  const std::string told = "the database refused to report commits of peer servers";
-  const size_t first = text.find(told);
+  const std::string warning = "the database refused to report commits of peer servers";
+  const size_t first = text.find(warning);
   ASSERT_NE(first, std::string::npos) << text;
-  EXPECT_EQ(text.find(told, first + 1), std::string::npos) << text;
-  EXPECT_EQ(proxy_->Asked("LISTEN hulld_batches"), 1);
+  EXPECT_EQ(text.find(warning, first + 1), std::string::npos) << text;
+  EXPECT_EQ(proxy_->QueryCount("LISTEN hulld_batches"), 1);
 }
 
 }  // namespace postgres_follow_test

@@ -23,12 +23,12 @@ namespace postgres_records_test {
 class PostgresRecords : public PostgresTest {
  protected:
   // The database's own counts.
-  std::string Counted() const { return Ask("SELECT count(*) FROM hulld.hulls").front(); }
-  std::string Kept() const { return Ask("SELECT hulls FROM hulld.store").front(); }
-  std::string CountedBodies() const { return Ask("SELECT count(*) FROM hulld.bodies").front(); }
-  std::string KeptBodies() const { return Ask("SELECT bodies FROM hulld.store").front(); }
+  std::string Counted() const { return RunSql("SELECT count(*) FROM hulld.hulls").front(); }
+  std::string Kept() const { return RunSql("SELECT hulls FROM hulld.store").front(); }
+  std::string CountedBodies() const { return RunSql("SELECT count(*) FROM hulld.bodies").front(); }
+  std::string KeptBodies() const { return RunSql("SELECT bodies FROM hulld.store").front(); }
   uint64_t KeptVertices() const {
-    return std::stoull(Ask("SELECT vertices FROM hulld.store").front());
+    return std::stoull(RunSql("SELECT vertices FROM hulld.store").front());
   }
   static uint64_t ResidentPages() {
     std::ifstream file("/proc/self/statm");
@@ -75,7 +75,7 @@ class PostgresRecords : public PostgresTest {
 TEST_F(PostgresRecords, NoRecordIsReadBeforeItIsRequested) {
   Start();
   FillSome();
-  Ask("UPDATE hulld.hulls SET record = '\\x00' WHERE hull_id = 'b'");
+  RunSql("UPDATE hulld.hulls SET record = '\\x00' WHERE hull_id = 'b'");
   Start();
   EXPECT_EQ(hulls_->registry().Cache().damaged, 0);
   EXPECT_EQ(hulls_->registry().Sizes().hull_count, 3);
@@ -147,7 +147,7 @@ TEST_F(PostgresRecords, NoBodyIsReadBeforeItIsRequested) {
     for (const char* id : {"body-1", "body-2", "body-3"}) {
       ASSERT_TRUE(PutBody(*hulls_, id).ok());
     }
-    Ask("UPDATE hulld.bodies SET body = '\\x00' WHERE body_id = 'body-2'");
+    RunSql("UPDATE hulld.bodies SET body = '\\x00' WHERE body_id = 'body-2'");
     Start();
     EXPECT_EQ(hulls_->registry().Cache().damaged, 0);
     EXPECT_EQ(hulls_->registry().Sizes().body_count, 3);
@@ -225,14 +225,14 @@ TEST_F(PostgresRecords, AWatchReportsBodiesThatAreNotInMemory) {
   ASSERT_TRUE(PutBody(*hulls_, "to-body").ok());
   ASSERT_TRUE(PutBody(*hulls_, "new").ok());
   ASSERT_TRUE(registry.peers().AwaitPeers({}).ok());
-  struct Told {
+  struct Reported {
     std::string id;
     ChangeKind kind;
     bool is_body;
-    bool operator==(const Told&) const = default;
+    bool operator==(const Reported&) const = default;
   };
-  const auto told = [&](const std::shared_ptr<Watch>& watch) {
-    std::vector<Told> all;
+  const auto reported = [&](const std::shared_ptr<Watch>& watch) {
+    std::vector<Reported> all;
     const absl::StatusOr<WatchBatch> batch = registry.feed().Next(watch);
     EXPECT_TRUE(batch.ok()) << batch.status();
     for (const HullChange& change : batch->changes) {
@@ -241,15 +241,15 @@ TEST_F(PostgresRecords, AWatchReportsBodiesThatAreNotInMemory) {
     registry.feed().Close(watch);
     return all;
   };
-  const std::vector<Told> expected = {{"changes", ChangeKind::kChanged, true},
-                                      {"ends", ChangeKind::kDeleted, true},
-                                      {"to-hull", ChangeKind::kReplaced, false},
-                                      {"to-body", ChangeKind::kReplaced, true},
-                                      {"new", ChangeKind::kCreated, true}};
-  EXPECT_TRUE(told(of_all) == expected);
-  const std::vector<Told> of_hulls_alone = {{"to-hull", ChangeKind::kCreated, false},
-                                            {"to-body", ChangeKind::kDeleted, false}};
-  EXPECT_TRUE(told(of_hulls) == of_hulls_alone);
+  const std::vector<Reported> expected = {{"changes", ChangeKind::kChanged, true},
+                                          {"ends", ChangeKind::kDeleted, true},
+                                          {"to-hull", ChangeKind::kReplaced, false},
+                                          {"to-body", ChangeKind::kReplaced, true},
+                                          {"new", ChangeKind::kCreated, true}};
+  EXPECT_TRUE(reported(of_all) == expected);
+  const std::vector<Reported> of_hulls_alone = {{"to-hull", ChangeKind::kCreated, false},
+                                                {"to-body", ChangeKind::kDeleted, false}};
+  EXPECT_TRUE(reported(of_hulls) == of_hulls_alone);
 }
 
 // HULLD_RECORDS sets the number of records for manual runs. Prints the cost of a start and that of
@@ -342,7 +342,7 @@ TEST_F(PostgresRecords, AWatchReportsExistingAndDeletedRecords) {
   FillSome();
   ASSERT_TRUE(hulls_->Create("d").ok());
   Registry& registry = hulls_->registry();
-  registry.KeepRecords(0);
+  registry.SetRecordCapacity(0);
   const uint64_t before = registry.Sizes().store_revision;
   ASSERT_TRUE(hulls_->Delete("a").ok());
   ASSERT_TRUE(hulls_->Delete("c").ok());
@@ -352,7 +352,7 @@ TEST_F(PostgresRecords, AWatchReportsExistingAndDeletedRecords) {
   // Evicts the cached knowledge of these IDs.
   for (int i = 0; i < 100; ++i) hulls_->View(absl::StrCat("none-", i)).IgnoreError();
   EXPECT_FALSE(registry.records().FindBodies(std::vector<std::string>{"b"}, {}, false).status.ok());
-  const auto told = [&](uint64_t after, bool bodies = false) {
+  const auto reported = [&](uint64_t after, bool bodies = false) {
     std::vector<std::pair<std::string, bool>> events;
     const WatchTarget target{.bodies = bodies};
     const auto ready = std::make_shared<std::counting_semaphore<>>(0);
@@ -373,10 +373,10 @@ TEST_F(PostgresRecords, AWatchReportsExistingAndDeletedRecords) {
     return events;
   };
   using Events = std::vector<std::pair<std::string, bool>>;
-  EXPECT_EQ(told(0), (Events{{"a", true}, {"d", true}}));
-  EXPECT_EQ(told(0, true), (Events{{"a", true}, {"b", true}, {"d", true}}));
-  EXPECT_EQ(told(before), (Events{{"c", false}, {"b", false}, {"a", true}}));
-  EXPECT_EQ(told(before, true), (Events{{"c", false}, {"a", true}, {"b", true}}));
+  EXPECT_EQ(reported(0), (Events{{"a", true}, {"d", true}}));
+  EXPECT_EQ(reported(0, true), (Events{{"a", true}, {"b", true}, {"d", true}}));
+  EXPECT_EQ(reported(before), (Events{{"c", false}, {"b", false}, {"a", true}}));
+  EXPECT_EQ(reported(before, true), (Events{{"c", false}, {"a", true}, {"b", true}}));
 }
 
 }  // namespace postgres_records_test

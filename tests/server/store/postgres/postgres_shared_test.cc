@@ -38,7 +38,7 @@ class PostgresShared : public PostgresTest {
     options_ = through_proxy;
     return server;
   }
-  void PollOnlyWhenAsked() { options_.poll_interval = options_.heartbeat = std::chrono::hours(1); }
+  void PollOnlyOnDemand() { options_.poll_interval = options_.heartbeat = std::chrono::hours(1); }
   static uint64_t Received(PostgresRegistry& server, const std::string& id) {
     const auto view = server.View(id);
     return view.ok() ? view->record.counts.received : 0;
@@ -77,7 +77,7 @@ class PostgresShared : public PostgresTest {
     const auto end = std::chrono::steady_clock::now() + std::chrono::minutes(1);
     const std::string ask =
         "SELECT 1 FROM pg_stat_activity WHERE pid <> pg_backend_pid() AND " + condition;
-    while (Ask(ask).empty() == is_some) {
+    while (RunSql(ask).empty() == is_some) {
       if (std::chrono::steady_clock::now() > end) {
         ADD_FAILURE() << (is_some ? "no session reaches " : "a session remains at ") << condition;
         return;
@@ -109,7 +109,7 @@ class PostgresShared : public PostgresTest {
 
 // Holds regardless of how rarely the server polls.
 TEST_F(PostgresShared, APeerServerServesAcknowledgedChanges) {
-  PollOnlyWhenAsked();
+  PollOnlyOnDemand();
   Start();
   const Server other = StartPeer();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
@@ -240,7 +240,7 @@ TEST_F(PostgresShared, CreationsDeletionsAndReplacementsOfOneIdTakeTurns) {
   EXPECT_EQ(balance, 0);
   EXPECT_TRUE(absl::IsNotFound(hulls_->View("h").status()));
   EXPECT_TRUE(absl::IsNotFound(other->View("h").status()));
-  EXPECT_EQ(Ask("SELECT count(*) FROM hulld.hulls").front(), "0");
+  EXPECT_EQ(RunSql("SELECT count(*) FROM hulld.hulls").front(), "0");
   EXPECT_EQ(hulls_->registry().Sizes().vertex_count, 0);
 }
 
@@ -293,14 +293,14 @@ TEST_F(PostgresShared, AWatchReportsChangesOfPeerServers) {
     ready.notify_all();
   });
   ASSERT_TRUE(watch.ok());
-  std::vector<std::pair<std::string, ChangeKind>> told;
+  std::vector<std::pair<std::string, ChangeKind>> reported;
   int waited = 0;
   const auto take_until = [&](size_t count) {
-    while (told.size() < count) {
+    while (reported.size() < count) {
       const auto batch = hulls_->registry().feed().Next(*watch);
       ASSERT_TRUE(batch.ok()) << batch.status();
       for (const HullChange& change : batch->changes) {
-        told.emplace_back(change.record.hull_id, change.kind);
+        reported.emplace_back(change.record.hull_id, change.kind);
       }
       if (batch->waits) ready.wait(waited++);
     }
@@ -312,10 +312,10 @@ TEST_F(PostgresShared, AWatchReportsChangesOfPeerServers) {
   ASSERT_TRUE(other->Delete("h").ok());
   take_until(3);
   hulls_->registry().feed().Close(*watch);
-  using Told = std::pair<std::string, ChangeKind>;
-  EXPECT_THAT(
-      told, ::testing::ElementsAre(Told("h", ChangeKind::kCreated), Told("h", ChangeKind::kChanged),
-                                   Told("h", ChangeKind::kDeleted)));
+  using Reported = std::pair<std::string, ChangeKind>;
+  EXPECT_THAT(reported, ::testing::ElementsAre(Reported("h", ChangeKind::kCreated),
+                                               Reported("h", ChangeKind::kChanged),
+                                               Reported("h", ChangeKind::kDeleted)));
 }
 
 // The stream keeps the hull registered but does not pin its memory.
@@ -369,27 +369,27 @@ TEST_F(PostgresShared, WatchesReportIdsThatBecameABodyOrAHull) {
   ASSERT_TRUE(PutBody(*other, "replaced").ok());
   ASSERT_TRUE(registry.peers().AwaitPeers({}).ok());
 
-  using Told = std::tuple<std::string, ChangeKind, bool>;
+  using Reported = std::tuple<std::string, ChangeKind, bool>;
   const auto told_to = [&](const std::shared_ptr<Watch>& watch) {
-    std::vector<Told> told;
+    std::vector<Reported> reported;
     for (bool waits = false; !waits;) {
       const auto batch = feed.Next(watch);
       if (!batch.ok()) break;
       for (const HullChange& change : batch->changes) {
-        told.emplace_back(change.record.hull_id, change.kind, change.is_body);
+        reported.emplace_back(change.record.hull_id, change.kind, change.is_body);
       }
       waits = batch->waits;
     }
     feed.Close(watch);
-    return told;
+    return reported;
   };
   EXPECT_THAT(told_to(*watch_hulls),
-              ::testing::ElementsAre(Told("was-hull", ChangeKind::kDeleted, false),
-                                     Told("was-body", ChangeKind::kCreated, false)));
+              ::testing::ElementsAre(Reported("was-hull", ChangeKind::kDeleted, false),
+                                     Reported("was-body", ChangeKind::kCreated, false)));
   EXPECT_THAT(told_to(*watch_both),
-              ::testing::ElementsAre(Told("was-hull", ChangeKind::kReplaced, true),
-                                     Told("was-body", ChangeKind::kReplaced, false),
-                                     Told("replaced", ChangeKind::kReplaced, true)));
+              ::testing::ElementsAre(Reported("was-hull", ChangeKind::kReplaced, true),
+                                     Reported("was-body", ChangeKind::kReplaced, false),
+                                     Reported("replaced", ChangeKind::kReplaced, true)));
 }
 
 TEST_F(PostgresShared, ACommitWithALostAnswerIsFoundAndNotRepeated) {
@@ -411,7 +411,7 @@ TEST_F(PostgresShared, ACommitWithALostAnswerIsFoundAndNotRepeated) {
 
 // The change is refused with an unknown outcome, and later applied as if a peer server had made it.
 TEST_F(PostgresShared, AnUnknownOutcomeIsResolvedLater) {
-  options_.patience = std::chrono::milliseconds(0);
+  options_.retry_timeout = std::chrono::milliseconds(0);
   for (const Cut cut : {Cut::kBeforeCommit, Cut::kAfterCommit}) {
     const std::string id = cut == Cut::kAfterCommit ? "after" : "before";
     Start();
@@ -448,7 +448,7 @@ TEST_F(PostgresShared, ALateCommitIsAwaited) {
   EXPECT_EQ(Received(*hulls_, "h"), 9);
 }
 
-TEST_F(PostgresShared, ACommitAfterItsTurnChangesNothing) {
+TEST_F(PostgresShared, ALateCommitChangesNothing) {
   Start();
   const Server other = StartPeer();
   auto put = PutAPointWhoseCommitIsHeld();
@@ -456,23 +456,23 @@ TEST_F(PostgresShared, ACommitAfterItsTurnChangesNothing) {
   EndSessions("state = 'idle in transaction'");
   ASSERT_TRUE(put.get().ok());
   ASSERT_TRUE(other->Put("h", {{10, 9, 9}}, "v").ok());
-  const std::string before = Ask("SELECT s::text FROM hulld.store s").front();
+  const std::string before = RunSql("SELECT s::text FROM hulld.store s").front();
   proxy_->Deliver();
-  EXPECT_EQ(Ask("SELECT s::text FROM hulld.store s").front(), before);
+  EXPECT_EQ(RunSql("SELECT s::text FROM hulld.store s").front(), before);
   EXPECT_EQ(Received(*hulls_, "h"), 10);
   EXPECT_EQ(Received(*other, "h"), 10);
 }
 
-TEST_F(PostgresShared, ALateRequestForTheTurnChangesNothing) {
+TEST_F(PostgresShared, ALateRequestForTheCommitLockChangesNothing) {
   Start();
   const Server other = StartPeer();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
   proxy_->CutNext(Cut::kHold);
   ASSERT_TRUE(hulls_->Put("h", {{9, 9, 9}}).ok());
   EXPECT_EQ(proxy_->cuts(), 1);
-  const std::string before = Ask("SELECT s::text FROM hulld.store s").front();
+  const std::string before = RunSql("SELECT s::text FROM hulld.store s").front();
   proxy_->Deliver();
-  EXPECT_EQ(Ask("SELECT s::text FROM hulld.store s").front(), before);
+  EXPECT_EQ(RunSql("SELECT s::text FROM hulld.store s").front(), before);
   ASSERT_TRUE(other->Put("h", {{10, 9, 9}}, "v").ok());
   EXPECT_EQ(Received(*hulls_, "h"), 10);
 }
@@ -496,7 +496,7 @@ TEST_F(PostgresShared, ACreationOrDeletionWithALostAnswerIsNotRepeated) {
 
 // Data of one record is not returned to a caller with an older record.
 TEST_F(PostgresShared, ReadsWithAnOldRecordAreAborted) {
-  PollOnlyWhenAsked();
+  PollOnlyOnDemand();
   Start();
   const Server other = StartPeer();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
@@ -517,7 +517,7 @@ TEST_F(PostgresShared, ReadsWithAnOldRecordAreAborted) {
 
 // The server's knowledge of the hull is stale, so deciding from it would be wrong in each case.
 TEST_F(PostgresShared, ChangesAreDecidedByPeerChanges) {
-  PollOnlyWhenAsked();
+  PollOnlyOnDemand();
   Start();
   const Server other = StartPeer();
   ASSERT_TRUE(hulls_->Create("h").ok());
@@ -575,22 +575,22 @@ TEST_F(PostgresShared, AServerWaitsIfTheDatabaseHasNoFreeSessions) {
   for (const int room : {1, 3}) {
     const std::string role = absl::StrCat("narrow_", room);
     const std::string database = cluster().MakeDatabase();
-    Ask(absl::StrCat("CREATE ROLE ", role, " LOGIN PASSWORD 'narrow' CONNECTION LIMIT ", room));
-    Ask(absl::StrCat("ALTER DATABASE ", database, " OWNER TO ", role));
+    RunSql(absl::StrCat("CREATE ROLE ", role, " LOGIN PASSWORD 'narrow' CONNECTION LIMIT ", room));
+    RunSql(absl::StrCat("ALTER DATABASE ", database, " OWNER TO ", role));
     options_.conninfo = absl::StrCat("host=", cluster().socket_directory(), " dbname=", database,
                                      " user=", role, " password=narrow");
-    options_.patience = std::chrono::milliseconds(0);
+    options_.retry_timeout = std::chrono::milliseconds(0);
     const absl::Status refused = Open().status();
     EXPECT_TRUE(absl::IsUnavailable(refused)) << refused;
     EXPECT_THAT(std::string(refused.message()), HasSubstr("too many connections"));
     AwaitNoSession(absl::StrCat("usename = '", role, "'"));
     bool has_waited = false;
     options_.should_stop = [&] {
-      Ask(absl::StrCat("ALTER ROLE ", role, " CONNECTION LIMIT -1"));
+      RunSql(absl::StrCat("ALTER ROLE ", role, " CONNECTION LIMIT -1"));
       has_waited = true;
       return false;
     };
-    options_.patience = std::chrono::seconds(10);
+    options_.retry_timeout = std::chrono::seconds(10);
     const auto opened = Open();
     EXPECT_TRUE(opened.ok()) << opened.status();
     EXPECT_TRUE(has_waited);
@@ -601,7 +601,8 @@ TEST_F(PostgresShared, AllServersContinueWhenTheDatabaseEndsTheirSessions) {
   Start();
   const Server other = StartPeer();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
-  Ask("SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE datname = current_database() "
+  RunSql(
+      "SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE datname = current_database() "
       "AND pid <> pg_backend_pid()");
   ASSERT_TRUE(other->Put("h", {{9, 9, 9}}).ok());
   EXPECT_EQ(Received(*hulls_, "h"), 9);
@@ -629,9 +630,9 @@ TEST_F(PostgresShared, AnExclusiveServerAndSharedServersExcludeEachOther) {
 }
 
 TEST_F(PostgresShared, WithoutSyncItIsRefused) {
-  Ask("ALTER ROLE hulld SET synchronous_commit = off");
+  RunSql("ALTER ROLE hulld SET synchronous_commit = off");
   const absl::Status status = Open().status();
-  Ask("ALTER ROLE hulld RESET synchronous_commit");
+  RunSql("ALTER ROLE hulld RESET synchronous_commit");
   EXPECT_TRUE(absl::IsFailedPrecondition(status)) << status;
   EXPECT_THAT(std::string(status.message()), HasSubstr("synchronous_commit"));
 }
@@ -644,7 +645,7 @@ TEST_F(PostgresShared, ARestoredDatabaseIsADifferentStoreForAllServers) {
   EXPECT_EQ(Received(*other, "h"), 8);
   bool ended = false;
   hulls_->store().OnEnded([&] { ended = true; });
-  Ask("UPDATE hulld.store SET batch = batch - 1");
+  RunSql("UPDATE hulld.store SET batch = batch - 1");
   EXPECT_TRUE(absl::IsUnavailable(hulls_->Put("h", {{9, 9, 9}}).status()));
   EXPECT_TRUE(ended);
   // Now, at the latest, the peer detects the new ID.
@@ -655,7 +656,7 @@ TEST_F(PostgresShared, ARestoredDatabaseIsADifferentStoreForAllServers) {
 
 // Half of a batch has arrived, and nothing follows.
 TEST_F(PostgresShared, AServerStalledWithinABatchBlocksPeersOnlyBriefly) {
-  options_.longest_send = std::chrono::milliseconds(100);
+  options_.send_timeout = std::chrono::milliseconds(100);
   options_.heartbeat = std::chrono::milliseconds(50);
   Start();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
@@ -685,7 +686,7 @@ TEST_F(PostgresShared, AServerTooFarBehindStops) {
   options_.poll_interval = std::chrono::hours(1);
   bool ended = false;
   hulls_->store().OnEnded([&] { ended = true; });
-  Ask("UPDATE hulld.store SET batch = batch + 1, pruned = batch + 1");
+  RunSql("UPDATE hulld.store SET batch = batch + 1, pruned = batch + 1");
   EXPECT_TRUE(absl::IsUnavailable(hulls_->View("h").status()));
   EXPECT_TRUE(ended);
 }

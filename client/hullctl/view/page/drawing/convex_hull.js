@@ -10,10 +10,10 @@ const GOLDEN_ANGLE = Math.PI * (3 - Math.sqrt(5));
 // Returns the index of the maximum measure.
 function farthest(points, measure) {
   let best = 0;
-  let most = -Infinity;
+  let largest = -Infinity;
   points.forEach((point, i) => {
     const value = measure(point);
-    if (value > most) [best, most] = [i, value];
+    if (value > largest) [best, largest] = [i, value];
   });
   return best;
 }
@@ -30,21 +30,21 @@ export function directions(count) {
 // Returns the index of the vertex that is farthest in a direction.
 export function extremeVertex(xyz, [x, y, z]) {
   let best = 0;
-  let most = -Infinity;
+  let largest = -Infinity;
   for (let i = 0; i < xyz.length; i += 3) {
     const height = x * xyz[i] + y * xyz[i + 1] + z * xyz[i + 2];
-    if (height > most) [best, most] = [i / 3, height];
+    if (height > largest) [best, largest] = [i / 3, height];
   }
   return best;
 }
 
-// Returns the vertices of {xyz} as [x, y, z] or, if there are more than `most`, the extreme ones in
-// that many directions.
-export function fewVertices({xyz}, most) {
+// Returns the vertices of {xyz} as [x, y, z] or, if there are more than `maxCount`, the extreme ones
+// in that many directions.
+export function fewVertices({xyz}, maxCount) {
   const at = (i) => [xyz[3 * i], xyz[3 * i + 1], xyz[3 * i + 2]];
   const count = xyz.length / 3;
-  if (count <= most) return Array.from({length: count}, (_, i) => at(i));
-  return [...new Set(directions(most).map((d) => extremeVertex(xyz, d)))].map(at);
+  if (count <= maxCount) return Array.from({length: count}, (_, i) => at(i));
+  return [...new Set(directions(maxCount).map((d) => extremeVertex(xyz, d)))].map(at);
 }
 
 // Returns the corners of the triangles of the hull of `points` ([x, y, z] each) as indices,

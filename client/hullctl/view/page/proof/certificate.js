@@ -143,10 +143,10 @@ function checkVertex(index, vertex, {xyz}, name) {
 }
 
 // Returns the points of A - B that the vertex pairs name, times both scales.
-export function differences(most, {pairs = []}, a, b) {
+export function differences(maxPairs, {pairs = []}, a, b) {
   require(
-      pairs.length <= most,
-      `the certificate has ${pairs.length} vertex pairs; its relation allows ${most}`);
+      pairs.length <= maxPairs,
+      `the certificate has ${pairs.length} vertex pairs; its relation allows ${maxPairs}`);
   pairs.forEach(({indexA = 0, indexB = 0, vertexA, vertexB}, i) => {
     checkVertex(indexA, vertexA, a, `pairs[${i}].a`);
     checkVertex(indexB, vertexB, b, `pairs[${i}].b`);

@@ -199,7 +199,7 @@ class MovingPair {
     } else if (problemOf(() => check('RELATION_OVERLAPPING'))) {
       this.checkBriefContact([Number(separatedUntil), time], certificate);
     } else {
-      require(relation === 'RELATION_OVERLAPPING', 'the hulls overlap, so they do not only touch');
+      require(relation === 'RELATION_OVERLAPPING', 'the hulls overlap; they do not merely touch');
     }
   }
 
@@ -220,7 +220,7 @@ function checkTimes(relation, {separatedUntil, contactTime}) {
   if (relation === 'RELATION_SEPARATED') {
     require(
         until === 1 && contactTime === undefined,
-        'the pair is SEPARATED, but not until 1, or it has a contact_time');
+        'the pair is SEPARATED, but separated_until is not 1, or there is a contact_time');
     return;
   }
   require(contactTime !== undefined, 'the contact has no contact_time');
@@ -270,14 +270,15 @@ function checkBodies(relation, contact, certificates, a, b) {
     const name = `pieces ${pieceA} of A and ${pieceB} of B: `;
     require(
         isThere(a[pieceA]) && isThere(b[pieceB]) && !proven.has(`${pieceA} ${pieceB}`),
-        `${name}no such pieces, an empty one, or two certificates`);
+        `${name}there is no such pair of nonempty pieces, or it has two certificates`);
     proven.add(`${pieceA} ${pieceB}`);
     const problem = problemOf(() => {
       const pair = pairOf(pieceA, pieceB);
       pair.checkIntervals(contact, intervals);
       if (own === 'RELATION_SEPARATED') return;
       require(
-          contact.contactTime !== undefined, 'they are in contact, but there is no contact_time');
+          contact.contactTime !== undefined,
+          'the pieces are in contact, but the answer has no contact_time');
       pair.checkContact(own, contact, certificate);
     });
     require(!problem, name + problem);

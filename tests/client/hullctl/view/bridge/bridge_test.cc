@@ -90,7 +90,7 @@ class BridgeTest : public ::testing::Test {
     host_ = "127.0.0.1:" + std::to_string(bridge_->port());
   }
 
-  std::string Ask(const std::string& target, const std::string& headers = "",
+  std::string Get(const std::string& target, const std::string& headers = "",
                   const std::string& method = "GET") {
     Socket socket(bridge_->port());
     socket.Send(method + " " + target + " HTTP/1.1\r\nHost: " + host_ +
@@ -101,7 +101,7 @@ class BridgeTest : public ::testing::Test {
   // Exchanges the token address for a session; returns the Cookie header.
   std::string ComeIn() {
     const std::string address = bridge_->Address();
-    const std::string answer = Ask(address.substr(address.find("/?")));
+    const std::string answer = Get(address.substr(address.find("/?")));
     const size_t at = answer.find("Set-Cookie: ");
     EXPECT_NE(at, std::string::npos) << answer;
     const size_t begin = at + std::string("Set-Cookie: ").size();
@@ -132,7 +132,7 @@ std::string TextFrame(const std::string& text, uint64_t size) {
 
 TEST_F(BridgeTest, PagePolicyAllowsOnlyItsOwnFiles) {
   const std::string cookie = ComeIn();
-  const std::string page = Ask("/", cookie);
+  const std::string page = Get("/", cookie);
   EXPECT_THAT(page, StartsWith("HTTP/1.1 200"));
   EXPECT_THAT(page, HasSubstr("Content-Security-Policy: default-src 'none'; script-src 'self' "));
   EXPECT_THAT(page, HasSubstr("connect-src ws://" + host_ + ";"));
@@ -141,32 +141,32 @@ TEST_F(BridgeTest, PagePolicyAllowsOnlyItsOwnFiles) {
   EXPECT_THAT(page, HasSubstr("<script type=\"module\" src=\"/main.js\">"));
   for (const PageFile& file : PageFiles()) {
     if (file.name == "index.html") continue;
-    EXPECT_THAT(Ask("/" + std::string(file.name), cookie),
+    EXPECT_THAT(Get("/" + std::string(file.name), cookie),
                 AllOf(StartsWith("HTTP/1.1 200"), HasSubstr(std::string(MediaTypeOf(file.name)))))
         << file.name;
   }
   for (const char* target : {"/index.html", "/../style.css", "/etc/passwd", "/three/", "/page"}) {
-    EXPECT_THAT(Ask(target, cookie), StartsWith("HTTP/1.1 404")) << target;
+    EXPECT_THAT(Get(target, cookie), StartsWith("HTTP/1.1 404")) << target;
   }
 }
 
 TEST_F(BridgeTest, ClientsWithoutASessionGetNothing) {
-  EXPECT_THAT(Ask("/"), AllOf(StartsWith("HTTP/1.1 403"), Not(HasSubstr("<script"))));
-  EXPECT_THAT(Ask("/style.css"), StartsWith("HTTP/1.1 403"));
-  EXPECT_THAT(Ask("/?token=0"), StartsWith("HTTP/1.1 403"));
+  EXPECT_THAT(Get("/"), AllOf(StartsWith("HTTP/1.1 403"), Not(HasSubstr("<script"))));
+  EXPECT_THAT(Get("/style.css"), StartsWith("HTTP/1.1 403"));
+  EXPECT_THAT(Get("/?token=0"), StartsWith("HTTP/1.1 403"));
   const std::string cookie = ComeIn();
-  EXPECT_THAT(Ask("/", cookie, "POST"), StartsWith("HTTP/1.1 405"));
+  EXPECT_THAT(Get("/", cookie, "POST"), StartsWith("HTTP/1.1 405"));
   const std::string own_host = host_;
   host_ = "evil.example:" + std::to_string(bridge_->port());
-  EXPECT_THAT(Ask("/", cookie), StartsWith("HTTP/1.1 421"));
+  EXPECT_THAT(Get("/", cookie), StartsWith("HTTP/1.1 421"));
   host_ = own_host;
-  EXPECT_THAT(Ask("/", cookie), StartsWith("HTTP/1.1 200"));
+  EXPECT_THAT(Get("/", cookie), StartsWith("HTTP/1.1 200"));
 }
 
 TEST_F(BridgeTest, AddressWorksOnce) {
   ComeIn();
   const std::string address = bridge_->Address();
-  EXPECT_THAT(Ask(address.substr(address.find("/?"))), StartsWith("HTTP/1.1 403"));
+  EXPECT_THAT(Get(address.substr(address.find("/?"))), StartsWith("HTTP/1.1 403"));
 }
 
 TEST_F(BridgeTest, OnlyThePagesOwnWebSocketIsServed) {
