@@ -15,6 +15,14 @@ namespace {
 constexpr size_t kMaxTrianglesToTest = 64;
 // A block of at most this many points is not sampled: all are tested against all triangles.
 constexpr size_t kSmallBlock = 8192;
+// A block, or a sample, of more than kWorthProbing points is sampled nevertheless if nearly all are
+// outside, as on a sphere: they would be moved to conflict lists in vain. This holds if, of kProbes
+// points, fewer than kFewInside are inside the first surface, usually an octahedron. Observed: none
+// on a sphere, 2 % to 5 % in scans of nearly convex objects, 15 % to 57 % in other meshes and
+// clouds.
+constexpr size_t kWorthProbing = 1024;
+constexpr size_t kProbes = 256;
+constexpr size_t kFewInside = 4;
 // Each sample, and finally the block, is this many times as large as the previous sample.
 constexpr size_t kSampleRatio = 16;
 // Samples consist of runs of consecutive points, for memory locality.
@@ -92,7 +100,23 @@ class BlockInsertion {
   size_t FirstStride() const {
     size_t stride = 1;
     while (points_.size() / stride > kSmallBlock) stride *= kSampleRatio;
+    if (points_.size() / stride > kWorthProbing && AreNearlyAllOutside()) stride *= kSampleRatio;
     return stride;
+  }
+
+  // Judged by points spread over the block. False if the surface is not small.
+  bool AreNearlyAllOutside() const {
+    if (surface_.triangle_count() > kMaxTrianglesToTest) return false;
+    size_t inside = 0;
+    for (size_t k = 0; k < kProbes && inside < kFewInside; ++k) {
+      const Vector& p = points_[k * points_.size() / kProbes];
+      bool is_seen = false;
+      surface_.ForEachTriangle([&](TriangleId id, const SurfaceTriangle&) {
+        is_seen = is_seen || surface_.IsCertainlySeenFrom(vertices_, id, p);
+      });
+      if (!is_seen) ++inside;
+    }
+    return inside < kFewInside;
   }
 
   ConflictLists::Outcome InsertSample(size_t stride) {

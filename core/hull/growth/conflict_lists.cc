@@ -11,7 +11,8 @@ namespace {
 
 // Poll steps for one insertion, which also moves the points of the lists that it changes.
 constexpr uint64_t kStepsPerInsertion = 4;
-// Number of insertions after which it is clear whether most points are inside.
+// Number of insertions after which it is clear whether most points are inside. On a small surface,
+// these start from the longest list.
 constexpr size_t kTrialInsertions = 24;
 // Average moves of a point above which another order of insertion is better. Observed: at most 8
 // for clouds and meshes with most points inside.
@@ -22,6 +23,7 @@ constexpr size_t kMaxMoves = 32;
 void ConflictLists::Take(std::span<const Vector> points) {
   CountTaken(points);
   sample_size_ = points.size();
+  longest_first_ = true;
   std::vector<TriangleId> targets;
   surface_.ForEachTriangle([&](TriangleId id, const SurfaceTriangle&) { targets.push_back(id); });
   sources_.clear();
@@ -41,6 +43,7 @@ void ConflictLists::Take(std::span<const Vector> points, std::span<const Triangl
   HULLD_CHECK(points.size() == seen.size());
   CountTaken(points);
   sample_size_ = sample_size;
+  longest_first_ = false;
   std::vector<TriangleId> targets;
   // Position among the targets, from 1, by triangle.
   std::vector<uint32_t> place(surface_.id_bound(), 0);
@@ -73,6 +76,7 @@ void ConflictLists::CountTaken(std::span<const Vector> points) {
 ConflictLists::Outcome ConflictLists::InsertAll() {
   size_t insertions = 0;
   for (; next_in_queue_ < queue_.size(); ++next_in_queue_) {
+    if (longest_first_ && insertions < kTrialInsertions) MoveLongestToFront();
     const TriangleId id = queue_[next_in_queue_];
     if (lists_[id].count == 0) continue;
     if (poll_.Step(kStepsPerInsertion + surface_.TakeSteps())) return Outcome::kStopped;
@@ -81,6 +85,18 @@ ConflictLists::Outcome ConflictLists::InsertAll() {
     if (moved_ > kMaxMoves * taken_ || IsMostlyOutside(insertions)) return Outcome::kGaveUp;
   }
   return poll_.stopped() ? Outcome::kStopped : Outcome::kDone;
+}
+
+// Moves the triangle with the longest list to the front of the queue. Otherwise, the first
+// insertions may be at slivers of the first surface, and most points are moved many times.
+// Observed: with the longest lists first, 5000 points of a cube take 0.4 to 0.9 of the time, and
+// clouds and meshes of 500 to 8192 points take at most 1.02.
+void ConflictLists::MoveLongestToFront() {
+  const auto is_shorter = [this](TriangleId a, TriangleId b) {
+    return lists_[a].count < lists_[b].count;
+  };
+  TriangleId* const front = queue_.data() + next_in_queue_;
+  std::swap(*front, *std::max_element(front, queue_.end(), is_shorter));
 }
 
 // True if most points are outside, judged after the first insertions. These add far points, so if

@@ -68,6 +68,7 @@ class ConflictLists {
   void Set(const List& list, size_t i, const Vector& p) {
     blocks_[list.first_block + i / PointBlock::kSize].Set(i % PointBlock::kSize, p);
   }
+  void MoveLongestToFront();
   bool IsMostlyOutside(size_t insertions);
   void CountTaken(std::span<const Vector> points);
   void InsertFrom(TriangleId id);
@@ -100,6 +101,8 @@ class ConflictLists {
   size_t moved_ = 0;
   // Number of points of the last sample, including points that were not accepted.
   size_t sample_size_ = 0;
+  // True if the first insertions start from the longest lists.
+  bool longest_first_ = false;
   // Largest absolute coordinate of a point.
   double size_ = 0;
 

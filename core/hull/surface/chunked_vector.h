@@ -45,8 +45,10 @@ class ChunkedVector {
 
   size_t size() const { return size_; }
   const T& operator[](size_t i) const { return chunks_[i >> kBits][i & kMask]; }
-  // Returns the element for modification, and records its old value in the journal, if any.
-  T& Mutable(size_t i) {
+  // Returns the element for modification, and records its old value in the journal, if any. Always
+  // inlined: the loops over triangles call it for each neighbor. Observed: hulls of points on a
+  // sphere take 0.9 of the time.
+  [[gnu::always_inline]] T& Mutable(size_t i) {
     if (i < journal_end_) Note(i);
     return chunks_[i >> kBits][i & kMask];
   }
@@ -125,7 +127,7 @@ class ChunkedVector {
     first_capacity_ = capacity;
   }
 
-  void Note(size_t i) {
+  [[gnu::noinline]] void Note(size_t i) {
     if (noted_.size() < chunks_.size()) noted_.resize(chunks_.size());
     uint64_t& noted = noted_[i >> kBits][(i & kMask) / 64];
     const uint64_t bit = uint64_t{1} << (i % 64);

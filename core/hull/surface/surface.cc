@@ -27,6 +27,21 @@ Vector WithUnitSize(const Vector& v) {
   return v.unaryExpr([exponent](double component) { return std::ldexp(component, -exponent); });
 }
 
+// Makes the plane exact if it is perpendicular to an axis and the sign of its normal is certain.
+// With a normal of length 1, so are the signs of all heights: x - a[k] is rounded once. Not
+// inlined, because SetPlane is then too long to be inlined. Many facets of CAD models are
+// perpendicular to an axis.
+[[gnu::noinline]] void SetExactPlane(SurfaceTriangle& t, const Vector& a, const Vector& b,
+                                     const Vector& c, double slope) {
+  for (Eigen::Index k = 0; k < 3; ++k) {
+    if (a[k] != b[k] || a[k] != c[k] || !(std::abs(t.normal[k]) > slope)) continue;
+    const double sign = t.normal[k] > 0 ? 1 : -1;
+    t.normal = sign * Vector::Unit(k);
+    t.offset = sign * a[k];
+    t.slope = 0;
+  }
+}
+
 // Sets the normal, the offset and the slope.
 inline void SetPlane(SurfaceTriangle& t, const Vector& a, const Vector& b, const Vector& c) {
   Vector e = b - a;
@@ -41,16 +56,7 @@ inline void SetPlane(SurfaceTriangle& t, const Vector& a, const Vector& b, const
   t.offset = t.normal.dot(a);
   t.slope = static_cast<float>(slope * kPlaneSlopeRoundUp);
   // The normal of a plane perpendicular to an axis has two zero components.
-  if (t.normal.x() * t.normal.y() != 0) return;
-  for (Eigen::Index k = 0; k < 3; ++k) {
-    if (a[k] != b[k] || a[k] != c[k] || !(std::abs(t.normal[k]) > slope)) continue;
-    // The normal's sign is certain, and with length 1, so are the signs of all heights: x - a[k] is
-    // rounded once. Many facets of CAD models are perpendicular to an axis.
-    const double sign = t.normal[k] > 0 ? 1 : -1;
-    t.normal = sign * Vector::Unit(k);
-    t.offset = sign * a[k];
-    t.slope = 0;
-  }
+  if (t.normal.x() * t.normal.y() == 0) SetExactPlane(t, a, b, c, slope);
 }
 
 }  // namespace
