@@ -532,7 +532,7 @@ TEST(MotionCheck, TimesMustFormABracket) {
   Claim without = claim();
   without.contact.clear_contact_time();
   ExpectInvalid(without, kCube, b, "no contact_time");
-  ExpectInvalid(Separated().Until(0.5, {1, 0, 0}), kCube, b, "not until 1");
+  ExpectInvalid(Separated().Until(0.5, {1, 0, 0}), kCube, b, "separated_until is not 1");
   ExpectInvalid(Separated().Until(1, {1, 0, 0}).Contact(1), kCube, Coming(3, 2), "contact_time");
 }
 

@@ -146,7 +146,7 @@ std::vector<SeedFile> SeedFiles() {
        "ply\nformat binary_big_endian 1.0\nelement vertex 2\nproperty double x\nproperty short y\n"
        "property uint z\nend_header\n" +
            packed.substr(0, 28)},
-      {FileKind::kXyz, "1 2 3\n4\t5 6 255 0 0\n\n# c\n-0 1e308 5e-324\n"},
+      {FileKind::kXyz, "1 2 3 255 0 0\n4\t5 6\n\n# c\n-0 1e308 5e-324\n"},
       {FileKind::kCsv, "t,x,y,\"z\"\n0,1,2,3\n1,\"4\",5,6\n"},
       {FileKind::kCsv, "1;2;3\n4;5;6\n"},
       {FileKind::kPcd,
@@ -157,7 +157,7 @@ std::vector<SeedFile> SeedFiles() {
        "POINTS 2\nDATA binary\n" +
            packed},
       {FileKind::kPcd, CompressedPcd()},
-      {FileKind::kXyz, "1,2,3\n4, 5, 6,7\n8;9;10\n"},
+      {FileKind::kXyz, "1,2,3,0\n4, 5, 6,7\n8;9;10\n"},
       {FileKind::kXyz, "2\n1 2 3 -9 255 0 0\n4 5 6\n1\n7 8 9\n"},
       {FileKind::kLas, SmallLas(2)},
       {FileKind::kLas, SmallLas(4)},

@@ -122,7 +122,8 @@ TEST(DaeFile, AccessorsHaveOffsetsStridesAndParameters) {
               HasSubstr("FILE:6: <accessor> lacks some of the parameters X, Y, and Z"));
   EXPECT_THAT(read("1 2 3 4 5 6", "count='2'", "").error(),
               HasSubstr("FILE:6: <accessor> has stride 1, too small for x, y, and z"));
-  EXPECT_THAT(read("1 2 3 4 5 6", "count='2' stride='0'", "").error(), HasSubstr("without room"));
+  EXPECT_THAT(read("1 2 3 4 5 6", "count='2' stride='0'", "").error(),
+              HasSubstr("too small for x, y, and z"));
   for (const char* accessor : {"count='3' stride='3'", "count='2' offset='1' stride='3'",
                                "count='2' stride='4'", "count='4294967295' stride='4294967295'"}) {
     EXPECT_THAT(read("1 2 3 4 5 6", accessor, "").error(),

@@ -104,8 +104,10 @@ TEST(DaeScene, TransformsWithoutMeaningAreRefused) {
   EXPECT_THAT(error("<matrix>1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 2</matrix>"),
               HasSubstr("<matrix> has a last row other than 0 0 0 1"));
   EXPECT_THAT(error("<matrix>1</matrix>"), HasSubstr("<matrix> is not 16 finite numbers"));
-  EXPECT_THAT(error("<lookat>1 1 1 1 1 1 0 0 1</lookat>"), HasSubstr("no direction"));
-  EXPECT_THAT(error("<lookat>0 0 0 0 0 1 0 0 1</lookat>"), HasSubstr("no direction"));
+  EXPECT_THAT(error("<lookat>1 1 1 1 1 1 0 0 1</lookat>"),
+              HasSubstr("has a direction of length 0"));
+  EXPECT_THAT(error("<lookat>0 0 0 0 0 1 0 0 1</lookat>"),
+              HasSubstr("has a direction of length 0"));
   EXPECT_THAT(error("<skew>45 1 0 0 1 1 0</skew>"), HasSubstr("not at right angles"));
   EXPECT_THAT(error("<skew>90 1 0 0 0 1 0</skew>"), HasSubstr("an angle of 90"));
 }
