@@ -64,7 +64,7 @@ install_and_build() {
   phase "Installing packages (about 1 minute the first time)"
   bash docker/packages.sh install build models >"$work/packages.log" 2>&1 ||
     { cat "$work/packages.log"; exit 1; }
-  phase "Building hulld and hullctl (about 4 minutes on 2 cores the first time)"
+  phase "Building hulld and hullctl (4 to 7 minutes on 2 cores the first time)"
   command -v ccache >/dev/null && export CMAKE_CXX_COMPILER_LAUNCHER=ccache
   { cmake --preset release -B "$build" -DHULLD_BUILD_TESTS=OFF &&
     cmake --build "$build" --target hulld hullctl --parallel "$(nproc)"; } 2>&1 |
@@ -219,7 +219,7 @@ draw_picture() {
 }
 
 mkdir -p "$work"
-echo "This takes about 5 minutes the first time (2 cores), and seconds after that."
+echo "This takes 5 to 8 minutes the first time (2 cores), and seconds after that."
 install_and_build
 start_server
 mesh_scenes
