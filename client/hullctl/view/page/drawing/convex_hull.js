@@ -38,8 +38,8 @@ export function extremeVertex(xyz, [x, y, z]) {
   return best;
 }
 
-// Returns the vertices of {xyz} as [x, y, z] or, if there are more than `maxCount`, the extreme ones
-// in that many directions.
+// Returns the vertices of {xyz} as [x, y, z] or, if there are more than `maxCount`, the extreme
+// ones in that many directions.
 export function fewVertices({xyz}, maxCount) {
   const at = (i) => [xyz[3 * i], xyz[3 * i + 1], xyz[3 * i + 2]];
   const count = xyz.length / 3;
