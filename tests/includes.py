@@ -19,13 +19,13 @@ import tempfile
 
 LARGE = ("Eigen/Core", "Eigen/Geometry", "absl/status/statusor.h", "boost/multiprecision/cpp_int.hpp",
          "grpcpp/grpcpp.h")
-# Sets of large headers that fewer files include are not precompiled.
+# A set of large headers is precompiled if at least this many files include exactly this set.
 MIN_FILES = 4
 INCLUDE = re.compile(r'^#include ["<]([^">]+)[">]', re.MULTILINE)
 
 
 def find_included(path, folders, names):
-    """Adds to `names` all headers that the file includes, directly or through the project's headers."""
+    """Adds to `names` all headers that the file includes, directly or through project headers."""
     for name in set(INCLUDE.findall(path.read_text())) - names:
         names.add(name)
         if (header := find(name, folders)) is not None:
@@ -46,7 +46,7 @@ def main():
         files |= {path.as_posix() for path in headers
                   if part == "client" or not path.with_suffix(".cc").exists()}
 
-    # By the large headers that they include.
+    # Files by the set of large headers that they include.
     groups = collections.defaultdict(list)
     for name in sorted(files):
         names = find_included(find(name, folders), folders, set())
@@ -54,7 +54,6 @@ def main():
 
     compiler = ["nice", "c++", "-std=c++20", "-I", ".", "-I", str(installed),
                 "-isystem", "/usr/include/eigen3", "-Wno-subobject-linkage"]
-    failed = []
     with tempfile.TemporaryDirectory() as work, \
             concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
 

@@ -16,8 +16,8 @@
 namespace hulld::server {
 
 // A stream that queues its replies. Any thread may add replies; they are written one at a time, in
-// order. One mutex guards the state. It is held when a read, a write, or the end of the call is
-// started, but not during gRPC's callbacks.
+// order. One mutex guards the state. Reads, writes, and the end of the call are started with the
+// mutex held; gRPC calls back without it.
 //
 // The stream ends once its final status is set, all earlier replies are written, and no work is in
 // flight. If the client disconnects or is revoked, the stream ends without sending the queued

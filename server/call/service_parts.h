@@ -16,9 +16,9 @@ struct ServiceParts {
   Admission& admission;
   // Builds chunks and replacements.
   TaskPool& writers;
-  // Run steps that may block: `readers` those for the records and hulls of one pair, `long_readers`
-  // those for many or large hulls.
+  // Loads the records and hulls of single pairs. Its tasks may block.
   TaskPool& readers;
+  // Like `readers`, for many or large hulls.
   TaskPool& long_readers;
   // Computes answers.
   TaskPool& pool;

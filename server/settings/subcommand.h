@@ -9,12 +9,12 @@
 
 namespace hulld::server {
 
-// Option that takes a string, or flag.
+// A flag, or an option with a string as its value.
 struct SubcommandOption {
   const char* name;
   std::variant<std::string*, bool*> value;
   const char* description;
-  // Environment variable with the default; empty for none.
+  // Environment variable that provides the string if the option is missing; empty for none.
   const char* variable = "";
 };
 

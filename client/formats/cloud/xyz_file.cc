@@ -56,8 +56,8 @@ absl::Status AddPoint(const ByteSource& source, std::string_view line, PointColl
   return AddTextPoint(source, line, points);
 }
 
-// Counts the columns of the first row into *columns, which is 0 before it. A later row with a
-// further number is an error: a lost line end joins two rows. Words may follow in any number.
+// Sets *columns, initially 0, to the number of columns of the scan's first row. A later row with
+// more numbers is an error, because a lost line end joins two rows. Any number of words may follow.
 absl::Status CheckColumns(const ByteSource& source, std::string_view row, size_t* columns) {
   const auto is_separator = [](char c) {
     return c == ' ' || c == ',' || c == ';' || (c >= '\t' && c <= '\r');
@@ -83,7 +83,7 @@ absl::Status CheckColumns(const ByteSource& source, std::string_view row, size_t
 }  // namespace
 
 absl::Status ReadXyz(ByteSource* source, PointCollector* points) {
-  // Points of the current scan: the declared number, if any, and the number read; and its columns.
+  // Of the current scan: the number of points declared, if any, and read, and the columns.
   std::optional<uint64_t> declared;
   uint64_t found = 0;
   size_t columns = 0;

@@ -73,8 +73,9 @@ class DaeWalk {
     for (LengthScale& scale : scale_) {
       const auto product = scale.Times(document_.unit());
       if (product) scale = *product;
-      if (!product)
+      if (!product) {
         Fail(document_.root(), "has a unit that overflows a double when multiplied by the scale");
+      }
     }
     VisitScene();
     if (vertices_ == 0) {

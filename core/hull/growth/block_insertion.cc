@@ -15,12 +15,12 @@ namespace {
 constexpr size_t kMaxTrianglesToTest = 64;
 // A block of at most this many points is not sampled: all are tested against all triangles.
 constexpr size_t kSmallBlock = 8192;
-// A block, or a sample, of more than kWorthProbing points is sampled nevertheless if nearly all are
-// outside, as on a sphere: they would be moved to conflict lists in vain. This holds if, of kProbes
-// points, fewer than kFewInside are inside the first surface, usually an octahedron. Observed: none
-// on a sphere, 2 % to 5 % in scans of nearly convex objects, 15 % to 57 % in other meshes and
-// clouds.
-constexpr size_t kWorthProbing = 1024;
+// A block, or a sample, of more than kMinPointsToProbe points is sampled even so if nearly all of
+// them are outside, as on a sphere, because assigning them to conflict lists would be wasted work.
+// They count as nearly all outside if fewer than kFewInside of kProbes points are inside the first
+// surface, usually an octahedron. **Observed** share inside: none on a sphere, 2 % to 5 % in scans
+// of nearly convex objects, 15 % to 57 % in other meshes and clouds.
+constexpr size_t kMinPointsToProbe = 1024;
 constexpr size_t kProbes = 256;
 constexpr size_t kFewInside = 4;
 // Each sample, and finally the block, is this many times as large as the previous sample.
@@ -100,11 +100,14 @@ class BlockInsertion {
   size_t FirstStride() const {
     size_t stride = 1;
     while (points_.size() / stride > kSmallBlock) stride *= kSampleRatio;
-    if (points_.size() / stride > kWorthProbing && AreNearlyAllOutside()) stride *= kSampleRatio;
+    if (points_.size() / stride > kMinPointsToProbe && AreNearlyAllOutside()) {
+      stride *= kSampleRatio;
+    }
     return stride;
   }
 
-  // Judged by points spread over the block. False if the surface is not small.
+  // Returns true if nearly all points are outside, judged by kProbes points spread over the block.
+  // Returns false if the surface has too many triangles to test.
   bool AreNearlyAllOutside() const {
     if (surface_.triangle_count() > kMaxTrianglesToTest) return false;
     size_t inside = 0;

@@ -149,8 +149,9 @@ absl::StatusOr<SimplifiedHull> SimplifyInside(const Hull& hull, const SimplifyTa
   if (absl::Status s = CheckTarget(target, least); !s.ok()) return s;
   const size_t all = hull.vertices().size();
   const size_t max_vertices = target.max_vertices == 0 ? all : std::min(all, target.max_vertices);
-  if (all <= least || (target.max_error == 0 && all == max_vertices))
+  if (all <= least || (target.max_error == 0 && all == max_vertices)) {
     return SimplifiedHull{hull, 0};
+  }
   StopPoll poll(target.should_stop);
   const VertexChoice choice = ChooseInside(hull, target.max_error, max_vertices, poll);
   if (poll.stopped()) return Stopped();

@@ -61,8 +61,9 @@ class Search {
           if (pairs_.size() == kMaxEmittedAnswers && !QueryAndEmit(emit)) break;
         }
       }
-      if (Stopped() || !QueryAndEmit(emit))
+      if (Stopped() || !QueryAndEmit(emit)) {
         return absl::CancelledError("the scene query was cancelled");
+      }
       const uint64_t candidates = std::max<uint64_t>(totals_.candidates - before, 1);
       width = static_cast<uint32_t>(std::clamp<uint64_t>(kCandidatesPerWindow * size / candidates,
                                                          1, std::min(2 * size, kMaxPlacements)));

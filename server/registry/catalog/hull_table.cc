@@ -231,8 +231,9 @@ void HullTable::RestSome(Locked& locked) {
     if (entry.awake_ != nullptr) {
       if (!entry.awake_->IsAtRest() || !RestCompact(locked, entry)) continue;
     }
-    if (!is_cache() || entries_.size() <= *capacity_ || std::exchange(entry.is_used_, false))
+    if (!is_cache() || entries_.size() <= *capacity_ || std::exchange(entry.is_used_, false)) {
       continue;
+    }
     EraseEntry(visited);
   }
 }

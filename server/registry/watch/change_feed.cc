@@ -197,8 +197,9 @@ void ChangeFeed::NoteFor(Locked& locked, const std::shared_ptr<WatchGroup>& grou
     auto node = changes.extract(std::exchange(place->second, revision));
     const bool was_deletion = node.mapped().is_deletion();
     if (was_deletion) --group->deletions;
-    if (was_deletion && change.kind == ChangeKind::kCreated)
+    if (was_deletion && change.kind == ChangeKind::kCreated) {
       node.mapped().previous_end = node.key();
+    }
     node.key() = revision;
     changes.insert(changes.end(), std::move(node));
   }

@@ -347,19 +347,21 @@ TEST(CsvFile, RowsWithMoreCellsThanTheHeaderAreErrors) {
 }
 
 // The last row was read as 7 8 910.
-TEST(CsvFile, RowsJoinedByALostLineEndAreErrors) {
-  for (const char* separator : {",", ";", "\t", " "}) {
-    const auto read = [separator](const char* last) {
-      return ReadText(
-          absl::StrReplaceAll(absl::StrCat("1 2 3\n4 5 6\n", last, "\n"), {{" ", separator}}),
-          PointFormat::kCsv);
-    };
-    EXPECT_EQ(read("7 8 910 11 12").error(),
-              "FILE:3: the row has 5 columns, but the first row has 3; is a line end missing?");
-    // Labels may have any number of words.
-    EXPECT_EQ(read("7 8 9 a tree").counts.points, 3u) << separator;
+TEST(TextTable, RowsJoinedByALostLineEndAreErrors) {
+  for (const PointFormat format : {PointFormat::kCsv, PointFormat::kXyz}) {
+    for (const char* separator : {",", ";", "\t", " "}) {
+      const auto read = [=](const char* last) {
+        return ReadText(
+            absl::StrReplaceAll(absl::StrCat("1 2 3\n4 5 6\n", last, "\n"), {{" ", separator}}),
+            format);
+      };
+      EXPECT_EQ(read("7 8 910 11 12").error(),
+                "FILE:3: the row has 5 columns, but the first row has 3; is a line end missing?");
+      // Labels may have any number of words.
+      EXPECT_EQ(read("7 8 9 a tree").counts.points, 3u) << separator;
+    }
+    EXPECT_EQ(ReadText("1 2 3 4 5\n6 7 8\n9 1 2 3 4\n", format).counts.points, 3u);
   }
-  EXPECT_EQ(ReadText("1 2 3 4 5\n6 7 8\n9 1 2 3 4\n", PointFormat::kCsv).counts.points, 3u);
 }
 
 TEST(CsvFile, AFirstLineMayNameTheSeparator) {

@@ -1,5 +1,3 @@
-#include <absl/strings/str_cat.h>
-#include <absl/strings/str_replace.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -41,20 +39,7 @@ TEST(PtsFile, FewerOrMorePointsThanDeclaredAreErrors) {
   EXPECT_EQ(ReadText("1\n1 x 3 4\n", PointFormat::kXyz).error(), "FILE:2: \"x\" is not a number");
 }
 
-// The last row was read as 7 8 910.
-TEST(XyzFile, RowsThatALostLineEndJoinedAreErrors) {
-  for (const char* separator : {",", ";", "\t", "  ", ", "}) {
-    const auto read = [separator](const char* last) {
-      return ReadText(
-          absl::StrReplaceAll(absl::StrCat("1 2 3\n4 5 6\n", last, "\n"), {{" ", separator}}),
-          PointFormat::kXyz);
-    };
-    EXPECT_EQ(read("7 8 910 11 12").error(),
-              "FILE:3: the row has 5 columns, but the first row has 3; is a line end missing?");
-    EXPECT_EQ(read("7 8 9").counts.points, 3u) << separator;
-    EXPECT_EQ(read("7 8 9 a tree 1").counts.points, 3u) << separator;
-  }
-  // Scans may have different columns; rows may lack some.
+TEST(PtsFile, ScansMayHaveDifferentColumns) {
   EXPECT_EQ(ReadText("1\n1 2 3\n2\n1 2 3 4\n5 6 7\n", PointFormat::kXyz).counts.points, 3u);
 }
 
