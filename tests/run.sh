@@ -63,7 +63,7 @@ run_part() {
 check_format() {
   # Versions of clang-format differ in their output.
   command -v clang-format-14 >/dev/null || { echo "skipped: clang-format-14 is not installed"; return 77; }
-  find core server client tests \( -name '*.cc' -o -name '*.h' -o -name '*.js' \) -print0 |
+  find proto core server client tests \( -name '*.cc' -o -name '*.h' -o -name '*.js' -o -name '*.proto' \) -print0 |
     xargs -0 -r clang-format-14 --dry-run -Werror ||
     { echo "Run clang-format-14 -i on the files above."; return 1; }
 }

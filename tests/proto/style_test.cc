@@ -7,7 +7,6 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
-#include <fstream>
 #include <functional>
 #include <regex>
 #include <set>
@@ -15,7 +14,6 @@
 #include <vector>
 
 #include "tests/proto/contract_files.h"
-#include "tests/source_tree.h"
 
 namespace hulld {
 namespace style_test {
@@ -190,20 +188,6 @@ TEST_F(ContractStyle, EveryErrorReasonStatesItsCode) {
     }
   });
   EXPECT_GE(reasons, 15);
-}
-
-TEST_F(ContractStyle, LinesHaveAtMost100Characters) {
-  const std::filesystem::path root = SourceTree() / "proto";
-  int lines = 0;
-  for (const auto& entry : std::filesystem::recursive_directory_iterator(root)) {
-    if (entry.path().extension() != ".proto") continue;
-    std::ifstream file(entry.path());
-    std::string line;
-    for (int number = 1; std::getline(file, line); ++number, ++lines) {
-      EXPECT_LE(line.size(), 100) << entry.path() << ":" << number;
-    }
-  }
-  EXPECT_GT(lines, 500);
 }
 
 }  // namespace style_test
