@@ -111,7 +111,7 @@ Ranking Rank(const VertexTable& vertices, StopPoll& poll) {
   ranked = SortedByPoint(vertices, std::move(ranked), poll);
   if (poll.stopped()) return {};
   Ranking ranking;
-  ranking.points.reserve(ranked.size());
+  ranking.points.resize(ranked.size());
   ranking.index_of.resize(vertices.id_bound());
   for (size_t i = 0; i < ranked.size(); ++i) {
     if (poll.Step()) return {};
@@ -120,7 +120,7 @@ Ranking Rank(const VertexTable& vertices, StopPoll& poll) {
       __builtin_prefetch(&ranking.index_of[ranked[ahead].id], 1);
     }
     ranking.index_of[ranked[i].id] = static_cast<uint32_t>(i);
-    ranking.points.push_back(vertices[ranked[i].id]);
+    ranking.points[i] = vertices[ranked[i].id];
   }
   return ranking;
 }
@@ -244,8 +244,11 @@ class FaceCollector {
     const size_t end = surface_.id_bound();
     for (TriangleId id = 0; id < end; ++id) {
       if (poll.Step()) return;
-      // Neighbors, vertices, and their ranks are scattered in memory, so all are prefetched. Not a
-      // function, because compilers drop calls without effect.
+      // Triangles are prefetched first, then what they refer to: neighbors, vertices, and ranks,
+      // which are scattered in memory. Not a function, because compilers drop calls without effect.
+      if (const size_t ahead = id + 2 * kAhead; ahead < end) {
+        __builtin_prefetch(&surface_.triangle(static_cast<TriangleId>(ahead)));
+      }
       if (const size_t ahead = id + kAhead; ahead < end) {
         __builtin_prefetch(&neighbor(ahead));
         __builtin_prefetch(&vertices_[neighbor(ahead - kAhead / 2).corners[1]]);
