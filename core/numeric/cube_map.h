@@ -38,13 +38,14 @@ inline Vector CubeDirection(uint32_t face, double s, double t) {
 // largest(). Branch-free on data, because directions are unpredictable. Among equally large
 // components, the first one wins. Zero maps to face 0, and a non-finite direction to an arbitrary
 // face.
+template <typename Real>
 class OnCube {
  public:
-  OnCube(double x, double y, double z) : components_{x, y, z, x, y} {
-    const double size_x = std::abs(x);
-    const double size_y = std::abs(y);
-    const double size_z = std::abs(z);
-    const double larger = std::max(size_x, size_y);
+  OnCube(Real x, Real y, Real z) : components_{x, y, z, x, y} {
+    const Real size_x = std::abs(x);
+    const Real size_y = std::abs(y);
+    const Real size_z = std::abs(z);
+    const Real larger = std::max(size_x, size_y);
     largest_ = std::max(larger, size_z);
     // Arithmetic on truth values, because compilers turn conditions into branches.
     const uint32_t is_y = size_y > size_x;
@@ -53,17 +54,17 @@ class OnCube {
   }
 
   // The absolute value of the largest component.
-  double largest() const { return largest_; }
+  Real largest() const { return largest_; }
   uint32_t axis() const { return axis_; }
   bool negative() const { return std::signbit(components_[axis_]); }
   uint32_t face() const { return CubeFace(axis_, negative()); }
-  double first() const { return components_[axis_ + 1]; }
-  double second() const { return components_[axis_ + 2]; }
+  Real first() const { return components_[axis_ + 1]; }
+  Real second() const { return components_[axis_ + 2]; }
 
  private:
   // The first two components are repeated, so that the two after any component need no table.
-  double components_[5];
-  double largest_;
+  Real components_[5];
+  Real largest_;
   uint32_t axis_;
 };
 

@@ -12,6 +12,7 @@ namespace hulld {
 
 // Unit roundoff: |fl(x op y) - x op y| <= u |x op y| without underflow.
 inline constexpr double kUnitRoundoff = 0x1p-53;
+inline constexpr double kFloatUnitRoundoff = 0x1p-24;
 
 // The 3x3 determinant of rounded coordinate differences has the sign of fl(det) if |fl(det)| >
 // fl(factor * fl(permanent)), without underflow. The error itself may be larger, up to 8 u
@@ -47,9 +48,9 @@ inline constexpr double kAuditErrorFactor = 32 * kUnitRoundoff;
 // Proven.
 inline constexpr double kTripleProductErrorFactor = 64 * kUnitRoundoff;
 
-// The relative margin that a direction map adds to its gauges; its rounding errors are below half
-// of this (see DirectionMap::Finish).
-inline constexpr double kDirectionMapMargin = 0x1p-20;
+// The largest relative error with which a direction map rejects points; its error is computed from
+// its reaches (see DirectionMap::Finish).
+inline constexpr double kDirectionMapMaxError = 0x1p-8;
 
 // The distance |p - (s e + t f)| for differences p, e, f of doubles and s, t in [0, 1] with rounded
 // sum at most 1 (exact sum at most 1 + u): components err by at most 4 u (|p| + |e| + |f|), the

@@ -53,11 +53,12 @@ inline constexpr double kPlaneMaxCoordinate = 0x1p600;
 inline constexpr double kTripleProductMin = 0x1p-300;
 inline constexpr double kTripleProductMax = 0x1p300;
 
-// A direction map divides by the distance of a point from its center and multiplies distances by at
-// most half its resolution, 2^9. Within these limits no quotient or product overflows or loses a
-// bit by underflow. Proven.
-inline constexpr double kMapMinDistance = 0x1p-1000;
-inline constexpr double kMapMaxDistance = 0x1p1000;
+// A direction map divides half its resolution, at most 2^13, by distances from its center, and
+// multiplies distances by gauges, which are reciprocals of distances. For distances within these
+// limits, in floats, no quotient overflows, and no product overflows or loses a bit by underflow.
+// Proven.
+inline constexpr float kMapMinDistance = 0x1p-60f;
+inline constexpr float kMapMaxDistance = 0x1p60f;
 
 // The audit's filter, n . p with |n| at most 2^63 and a bound of 2^15 |p|, runs for |p| between
 // these limits. Three products that underflow, 2^-1075 each, are far below the bound, and no

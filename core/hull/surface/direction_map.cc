@@ -28,8 +28,15 @@ double RowSumNorm(const Eigen::Matrix3d& m) { return m.cwiseAbs().rowwise().sum(
 
 }  // namespace
 
+MapFrame::MapFrame(const Vector& center, double size) : center_(center) {
+  // The limits keep the diagonal of L normal.
+  const double scale = std::ldexp(1, -std::clamp(std::ilogb(size), -1000, 1000));
+  entries_ = {scale, 0, scale, 0, 0, scale};
+}
+
 // L is the inverse of the Cholesky factor of the moments.
-MapFrame::MapFrame(const Vector& center, const Eigen::Matrix3d& moments) : center_(center) {
+MapFrame::MapFrame(const Vector& center, double size, const Eigen::Matrix3d& moments)
+    : MapFrame(center, size) {
   const double trace = moments.trace();
   if (!(trace > 0 && trace <= kLargestDouble)) return;
   const Eigen::Matrix3d c = moments / trace;
@@ -46,7 +53,8 @@ MapFrame::MapFrame(const Vector& center, const Eigen::Matrix3d& moments) : cente
     inverse(i, i) = 1 / factor(i, i);
   }
   if (RowSumNorm(inverse) * RowSumNorm(factor) < kWorthAFrame) return;
-  const Eigen::Matrix3d l = inverse / inverse.cwiseAbs().maxCoeff();
+  const double scale = entries_[0];
+  const Eigen::Matrix3d l = inverse * (scale / inverse.cwiseAbs().maxCoeff());
   entries_ = {l(0, 0), l(1, 0), l(1, 1), l(2, 0), l(2, 1), l(2, 2)};
   is_plain_ = false;
 }
@@ -57,7 +65,6 @@ Eigen::Matrix3d MapFrame::matrix() const {
 }
 
 Vector MapFrame::FromMap(const Vector& direction) const {
-  if (is_plain_) return direction;
   const auto& [xx, yx, yy, zx, zy, zz] = entries_;
   const double x = direction.x() / xx;
   const double y = (direction.y() - yx * x) / yy;
@@ -77,7 +84,7 @@ DirectionMap::DirectionMap(const MapFrame& frame, int resolution)
 
 void DirectionMap::AppendCorner(double reach) {
   HULLD_DCHECK(gauges_.size() < corner_count());
-  gauges_.push_back((1 + kDirectionMapMargin) / reach);
+  gauges_.push_back(static_cast<float>(1 / reach));
 }
 
 void DirectionMap::AppendCell(uint32_t hint) {
@@ -92,31 +99,35 @@ Vector DirectionMap::CornerDirection(int face, int i, int j) const {
 }
 
 // The gauge g of the set around c, in the frame, is convex and subadditive. |L| is the largest sum
-// of a row's absolute entries, E the extent, u0 the unit roundoff.
+// of a row's absolute entries, E the extent, u0 the unit roundoff of doubles, u1 that of floats.
 //
 // A corner: solving L w = d for its direction d is exact for a right side within 4 u0 |L| |w| of d
 // (Higham 2002, 8.5), and its point, m w beyond c, is rounded by at most 2 u0 (|c| + m |w|), where
 // m |w| is at most E. The point is therefore within u0 |L| (6 E + 2 |c|) of m d in the frame, and
 // g(d) is at most 1 / m times 1 + u0 |L| (6 E + 2 |c|) max g, with max g over all directions.
 //
-// A point p: L (p - c) errs by at most 4 u0 |L| |p - c|, and g there is at least |p - c| / E,
-// because the set is within E of c. The error is at most 4 u0 |L| E max g of itself. The direction
-// at which it is interpolated is within 8 u0 of its own, which adds at most 8 u0 max g. The
-// interpolation has positive terms and errs, with the distance and the stored gauges, by 16 u0 of
-// itself, which is at least the least gauge.
+// A point p: L (p - c) errs by at most 4 u0 |L| |p - c| in doubles, and g there is at least
+// |p - c| / E, because the set is within E of c. The error is at most 4 u0 |L| E max g of itself.
+// Converted to floats, a component and the distance err by u1 each, the scale and its product with
+// the component by u1 each, up to half the resolution, and the sum by u1 of the resolution: the
+// direction at which the gauge is interpolated is within 6 u1 of its own, which adds at most
+// 7 u1 max g. The interpolation has positive terms; a stored gauge, the rest of a position, and
+// two products and sums of each err by 8 u1 in total, and the distance and its product with the
+// gauge by 2 u1. That is at most 11 u1 of itself, which is at least the least gauge.
 //
 // max g is at most 1 / least reach, the least gauge 1 / largest reach. Relative to the computed
-// value the total is at most ratio (24 + 16 stretch) u0, with ratio = largest / least reach and
-// stretch = |L| (E + |c|) / least reach; half of kDirectionMapMargin bounds it. Products that
-// underflow add less than the slack, because distances are at least kMapMinDistance. Proven.
+// value the total is at most ratio (16 stretch u0 + 18 u1), with ratio = largest / least reach and
+// stretch = |L| (E + |c|) / least reach; 20 u1 leaves slack. An error e is covered by a limit of
+// 1 - 2 e, whose rounding to a float is below e. Within kMapMinDistance and kMapMaxDistance,
+// underflow adds less than the slack. Proven.
 void DirectionMap::Finish(double min_reach, double largest_reach, double extent) {
   HULLD_CHECK(gauges_.size() == corner_count() && hints_.size() == cell_count());
-  if (!(min_reach > 0)) return;
+  if (!(min_reach >= kMapMinDistance && largest_reach <= kMapMaxDistance)) return;
   const double ratio = largest_reach / min_reach;
   const double stretch =
       RowSumNorm(frame_.matrix()) * (extent + LargestComponent(center())) / min_reach;
-  const double error = ratio * (24 + 16 * stretch) * kUnitRoundoff;
-  rejects_ = error < 0.5 * kDirectionMapMargin;
+  const double error = ratio * (16 * stretch * kUnitRoundoff + 20 * kFloatUnitRoundoff);
+  if (error < kDirectionMapMaxError) limit_ = static_cast<float>(1 - 2 * error);
 }
 
 bool DirectionMap::Coarsen() {
@@ -132,7 +143,7 @@ bool DirectionMap::Coarsen() {
       for (size_t k = 0; k <= cells; k += 2) coarse.gauges_.push_back(gauges_[row + k]);
     }
   }
-  coarse.rejects_ = rejects_;
+  coarse.limit_ = limit_;
   *this = std::move(coarse);
   return true;
 }
@@ -143,7 +154,7 @@ void DirectionMap::AppendSurvivors(std::span<const Vector> points, std::vector<u
   constexpr size_t kChunk = 1024;
   // Extra capacity, because four indices are written together.
   std::array<uint32_t, kChunk + 4> buffer;
-  const bool has_avx2 = UsesAvx2() && rejects_;
+  const bool has_avx2 = UsesAvx2() && limit_ > 0;
   for (size_t first = 0; first < points.size() && !poll.Step(); first += kChunk) {
     const std::span<const Vector> chunk =
         points.subspan(first, std::min(kChunk, points.size() - first));
@@ -162,13 +173,19 @@ void DirectionMap::AppendSurvivors(std::span<const Vector> points, std::vector<u
 #ifdef HULLD_HAS_AVX2_PATH
 namespace {
 
-// Steps of WriteSurvivorsAvx2, for four points together. Each performs the same operations as the
+// Steps of WriteSurvivorsAvx2, for eight points together. Each performs the same operations as the
 // scalar function that it names, so that the results are the same.
 
 struct FourVectors {
   __m256d x;
   __m256d y;
   __m256d z;
+};
+
+struct EightVectors {
+  __m256 x;
+  __m256 y;
+  __m256 z;
 };
 
 // Loads four consecutive points.
@@ -184,176 +201,204 @@ struct FourVectors {
           _mm256_shuffle_pd(ac, bc, 0b1010)};
 }
 
+// Rounds to floats.
+[[gnu::target("avx2"), gnu::always_inline]] inline __m256 Narrow(__m256d low, __m256d high) {
+  return _mm256_set_m128(_mm256_cvtpd_ps(high), _mm256_cvtpd_ps(low));
+}
+
 // MapFrame::ToMap.
-class FrameOfFour {
+class FrameOfEight {
  public:
-  [[gnu::target("avx2"), gnu::always_inline]] explicit FrameOfFour(const MapFrame& frame)
+  [[gnu::target("avx2"), gnu::always_inline]] explicit FrameOfEight(const MapFrame& frame)
       : center_{_mm256_set1_pd(frame.center().x()), _mm256_set1_pd(frame.center().y()),
                 _mm256_set1_pd(frame.center().z())},
         is_plain_(frame.is_plain()),
         l_(frame.matrix()) {}
 
-  [[gnu::target("avx2"), gnu::always_inline]] FourVectors ToMap(const FourVectors& points) const {
-    __m256d x = _mm256_sub_pd(points.x, center_.x);
-    __m256d y = _mm256_sub_pd(points.y, center_.y);
-    __m256d z = _mm256_sub_pd(points.z, center_.z);
-    if (!is_plain_) {
-      z = _mm256_add_pd(_mm256_add_pd(_mm256_mul_pd(_mm256_set1_pd(l_(2, 0)), x),
-                                      _mm256_mul_pd(_mm256_set1_pd(l_(2, 1)), y)),
-                        _mm256_mul_pd(_mm256_set1_pd(l_(2, 2)), z));
-      y = _mm256_add_pd(_mm256_mul_pd(_mm256_set1_pd(l_(1, 0)), x),
-                        _mm256_mul_pd(_mm256_set1_pd(l_(1, 1)), y));
-      x = _mm256_mul_pd(_mm256_set1_pd(l_(0, 0)), x);
-    }
-    return {x, y, z};
+  // Returns the images of eight consecutive points.
+  [[gnu::target("avx2"), gnu::always_inline]] EightVectors ToMap(const Vector* points) const {
+    const FourVectors low = ToMap(LoadFour(points));
+    const FourVectors high = ToMap(LoadFour(points + 4));
+    return {Narrow(low.x, high.x), Narrow(low.y, high.y), Narrow(low.z, high.z)};
   }
 
  private:
+  [[gnu::target("avx2"), gnu::always_inline]] FourVectors ToMap(const FourVectors& points) const {
+    const __m256d x = _mm256_sub_pd(points.x, center_.x);
+    const __m256d y = _mm256_sub_pd(points.y, center_.y);
+    const __m256d z = _mm256_sub_pd(points.z, center_.z);
+    if (is_plain_) return {Times(0, 0, x), Times(0, 0, y), Times(0, 0, z)};
+    return {Times(0, 0, x), _mm256_add_pd(Times(1, 0, x), Times(1, 1, y)),
+            _mm256_add_pd(_mm256_add_pd(Times(2, 0, x), Times(2, 1, y)), Times(2, 2, z))};
+  }
+  [[gnu::target("avx2"), gnu::always_inline]] __m256d Times(int i, int j, __m256d v) const {
+    return _mm256_mul_pd(_mm256_set1_pd(l_(i, j)), v);
+  }
+
   FourVectors center_;
   bool is_plain_;
   Eigen::Matrix3d l_;
 };
 
 // OnCube.
-struct FourOnCube {
-  [[gnu::target("avx2"), gnu::always_inline]] explicit FourOnCube(const FourVectors& v) {
-    const __m256d sign = _mm256_set1_pd(-0.0);
-    const __m256d zero = _mm256_setzero_pd();
-    const __m256d abs_x = _mm256_andnot_pd(sign, v.x);
-    const __m256d abs_y = _mm256_andnot_pd(sign, v.y);
-    const __m256d abs_z = _mm256_andnot_pd(sign, v.z);
+struct EightOnCube {
+  [[gnu::target("avx2"), gnu::always_inline]] explicit EightOnCube(const EightVectors& v) {
+    const __m256 sign = _mm256_set1_ps(-0.0f);
+    const __m256 abs_x = _mm256_andnot_ps(sign, v.x);
+    const __m256 abs_y = _mm256_andnot_ps(sign, v.y);
+    const __m256 abs_z = _mm256_andnot_ps(sign, v.z);
     // NaN if y or z is NaN: the point is then out of range. x is never NaN.
-    largest = _mm256_max_pd(abs_x, _mm256_max_pd(abs_y, abs_z));
-    const __m256d is_x = _mm256_cmp_pd(abs_x, largest, _CMP_EQ_OQ);
-    const __m256d is_y = _mm256_andnot_pd(is_x, _mm256_cmp_pd(abs_y, largest, _CMP_EQ_OQ));
-    const __m256d along = _mm256_blendv_pd(_mm256_blendv_pd(v.z, v.y, is_y), v.x, is_x);
-    first = _mm256_blendv_pd(_mm256_blendv_pd(v.x, v.z, is_y), v.y, is_x);
-    second = _mm256_blendv_pd(_mm256_blendv_pd(v.y, v.x, is_y), v.z, is_x);
-    face =
-        _mm256_blendv_pd(_mm256_blendv_pd(_mm256_set1_pd(4), _mm256_set1_pd(2), is_y), zero, is_x);
-    face = _mm256_add_pd(face,
-                         _mm256_and_pd(_mm256_cmp_pd(along, zero, _CMP_LT_OQ), _mm256_set1_pd(1)));
+    largest = _mm256_max_ps(abs_x, _mm256_max_ps(abs_y, abs_z));
+    const __m256 is_x = _mm256_cmp_ps(abs_x, largest, _CMP_EQ_OQ);
+    const __m256 is_y = _mm256_andnot_ps(is_x, _mm256_cmp_ps(abs_y, largest, _CMP_EQ_OQ));
+    const __m256 along = _mm256_blendv_ps(_mm256_blendv_ps(v.z, v.y, is_y), v.x, is_x);
+    first = _mm256_blendv_ps(_mm256_blendv_ps(v.x, v.z, is_y), v.y, is_x);
+    second = _mm256_blendv_ps(_mm256_blendv_ps(v.y, v.x, is_y), v.z, is_x);
+    const __m256 is_negative = _mm256_cmp_ps(along, _mm256_setzero_ps(), _CMP_LT_OQ);
+    face = _mm256_add_ps(
+        _mm256_blendv_ps(_mm256_andnot_ps(is_x, _mm256_set1_ps(4)), _mm256_set1_ps(2), is_y),
+        _mm256_and_ps(is_negative, _mm256_set1_ps(1)));
   }
-  __m256d face;
-  __m256d largest;
-  __m256d first;
-  __m256d second;
+  __m256 face;
+  __m256 largest;
+  __m256 first;
+  __m256 second;
 };
 
 // component * scale + half, from 0 to n.
-[[gnu::target("avx2"), gnu::always_inline]] inline __m256d AlongSide(__m256d component,
-                                                                     __m256d scale, __m256d half,
-                                                                     __m256d n) {
-  const __m256d along = _mm256_add_pd(_mm256_mul_pd(component, scale), half);
-  return _mm256_max_pd(_mm256_min_pd(along, n), _mm256_setzero_pd());
+[[gnu::target("avx2"), gnu::always_inline]] inline __m256 AlongSide(__m256 component, __m256 scale,
+                                                                    __m256 half, __m256 n) {
+  const __m256 along = _mm256_add_ps(_mm256_mul_ps(component, scale), half);
+  return _mm256_max_ps(_mm256_min_ps(along, n), _mm256_setzero_ps());
 }
 
 // Constants of DirectionMap::PlaceIn for a resolution.
-struct GridOfFour {
-  [[gnu::target("avx2"), gnu::always_inline]] explicit GridOfFour(int resolution)
-      : half(_mm256_set1_pd(0.5 * resolution)),
-        cells(_mm256_set1_pd(resolution)),
-        last(_mm256_set1_pd(resolution - 1)),
-        corners(_mm256_set1_pd(resolution + 1)) {}
-  __m256d half;
-  __m256d cells;
-  __m256d last;
-  __m256d corners;
+struct GridOfEight {
+  [[gnu::target("avx2"), gnu::always_inline]] explicit GridOfEight(float resolution)
+      : half(_mm256_set1_ps(0.5f * resolution)),
+        cells(_mm256_set1_ps(resolution)),
+        last(_mm256_set1_ps(resolution - 1)),
+        corners(_mm256_set1_ps(resolution + 1)) {}
+  __m256 half;
+  __m256 cells;
+  __m256 last;
+  __m256 corners;
 };
 
 // DirectionMap::PlaceIn, without the cell.
-struct FourPlaces {
-  [[gnu::target("avx2"), gnu::always_inline]] FourPlaces(const FourVectors& v,
-                                                         const GridOfFour& grid) {
-    const FourOnCube on_cube(v);
+struct EightPlaces {
+  [[gnu::target("avx2"), gnu::always_inline]] EightPlaces(const EightVectors& v,
+                                                          const GridOfEight& grid) {
+    const EightOnCube on_cube(v);
     distance = on_cube.largest;
-    const __m256d scale = _mm256_div_pd(grid.half, distance);
-    const __m256d first = AlongSide(on_cube.first, scale, grid.half, grid.cells);
-    const __m256d second = AlongSide(on_cube.second, scale, grid.half, grid.cells);
-    const __m256d row = _mm256_floor_pd(_mm256_min_pd(first, grid.last));
-    const __m256d column = _mm256_floor_pd(_mm256_min_pd(second, grid.last));
-    along_first = _mm256_sub_pd(first, row);
-    along_second = _mm256_sub_pd(second, column);
-    // A point whose distance is zero or out of range reads the first gauges and is kept.
-    in_range = _mm256_and_pd(_mm256_cmp_pd(distance, _mm256_set1_pd(kMapMinDistance), _CMP_GE_OQ),
-                             _mm256_cmp_pd(distance, _mm256_set1_pd(kMapMaxDistance), _CMP_LE_OQ));
-    const __m256d in_row = _mm256_add_pd(_mm256_mul_pd(on_cube.face, grid.corners), row);
-    const __m256d at = _mm256_add_pd(_mm256_mul_pd(in_row, grid.corners), column);
-    _mm_store_si128(reinterpret_cast<__m128i*>(corner),
-                    _mm256_cvttpd_epi32(_mm256_and_pd(at, in_range)));
+    const __m256 scale = _mm256_div_ps(grid.half, distance);
+    const __m256 first = AlongSide(on_cube.first, scale, grid.half, grid.cells);
+    const __m256 second = AlongSide(on_cube.second, scale, grid.half, grid.cells);
+    const __m256 row = _mm256_floor_ps(_mm256_min_ps(first, grid.last));
+    const __m256 column = _mm256_floor_ps(_mm256_min_ps(second, grid.last));
+    along_first = _mm256_sub_ps(first, row);
+    along_second = _mm256_sub_ps(second, column);
+    // A point out of range reads the first gauges and is kept.
+    in_range = _mm256_and_ps(_mm256_cmp_ps(distance, _mm256_set1_ps(kMapMinDistance), _CMP_GE_OQ),
+                             _mm256_cmp_ps(distance, _mm256_set1_ps(kMapMaxDistance), _CMP_LE_OQ));
+    // Exact, because maps have fewer than 2^24 corners.
+    const __m256 in_row = _mm256_add_ps(_mm256_mul_ps(on_cube.face, grid.corners), row);
+    const __m256 at = _mm256_add_ps(_mm256_mul_ps(in_row, grid.corners), column);
+    _mm256_store_si256(reinterpret_cast<__m256i*>(corner),
+                       _mm256_cvttps_epi32(_mm256_and_ps(at, in_range)));
   }
-  alignas(16) int32_t corner[4];
-  __m256d along_first;
-  __m256d along_second;
-  __m256d distance;
-  __m256d in_range;
+  alignas(32) int32_t corner[8];
+  __m256 along_first;
+  __m256 along_second;
+  __m256 distance;
+  __m256 in_range;
 };
 
 // Returns a if t is 0, b if it is 1.
-[[gnu::target("avx2"), gnu::always_inline]] inline __m256d Interpolate(__m256d a, __m256d b,
-                                                                       __m256d t, __m256d rest) {
-  return _mm256_add_pd(_mm256_mul_pd(a, rest), _mm256_mul_pd(b, t));
+[[gnu::target("avx2"), gnu::always_inline]] inline __m256 Interpolate(__m256 a, __m256 b, __m256 t,
+                                                                      __m256 rest) {
+  return _mm256_add_ps(_mm256_mul_ps(a, rest), _mm256_mul_ps(b, t));
 }
 
-// The gauges at four corners, and at the next corner after each. Loads pairs, because four gathers
-// take longer.
+// Returns two pairs of floats.
+[[gnu::target("avx2"), gnu::always_inline]] inline __m128 LoadPairs(const float* low,
+                                                                    const float* high) {
+  const __m128i pair = _mm_loadl_epi64(reinterpret_cast<const __m128i*>(low));
+  return _mm_loadh_pi(_mm_castsi128_ps(pair), reinterpret_cast<const __m64*>(high));
+}
+
+// The gauges at eight corners, and at the next corner after each. Loads pairs, because gathers take
+// longer.
 struct GaugesOfRow {
-  [[gnu::target("avx2"), gnu::always_inline]] GaugesOfRow(const double* gauges, const int32_t* at) {
-    const __m256d even = _mm256_loadu2_m128d(gauges + at[2], gauges + at[0]);
-    const __m256d odd = _mm256_loadu2_m128d(gauges + at[3], gauges + at[1]);
-    first = _mm256_unpacklo_pd(even, odd);
-    second = _mm256_unpackhi_pd(even, odd);
+  [[gnu::target("avx2"), gnu::always_inline]] GaugesOfRow(const float* gauges, const int32_t* at) {
+    const __m256 even = _mm256_set_m128(LoadPairs(gauges + at[4], gauges + at[5]),
+                                        LoadPairs(gauges + at[0], gauges + at[1]));
+    const __m256 odd = _mm256_set_m128(LoadPairs(gauges + at[6], gauges + at[7]),
+                                       LoadPairs(gauges + at[2], gauges + at[3]));
+    first = _mm256_shuffle_ps(even, odd, 0b10'00'10'00);
+    second = _mm256_shuffle_ps(even, odd, 0b11'01'11'01);
   }
-  __m256d first;
-  __m256d second;
+  __m256 first;
+  __m256 second;
 };
 
 // DirectionMap::GaugeAt.
-[[gnu::target("avx2"), gnu::always_inline]] inline __m256d GaugesAt(const FourPlaces& places,
-                                                                    const double* gauges,
-                                                                    int resolution) {
-  const __m256d one = _mm256_set1_pd(1);
+[[gnu::target("avx2"), gnu::always_inline]] inline __m256 GaugesAt(const EightPlaces& places,
+                                                                   const float* gauges,
+                                                                   int resolution) {
+  const __m256 one = _mm256_set1_ps(1);
   const GaugesOfRow low(gauges, places.corner);
   const GaugesOfRow high(gauges + resolution + 1, places.corner);
-  const __m256d s = places.along_first;
-  const __m256d t = places.along_second;
-  const __m256d rest_s = _mm256_sub_pd(one, s);
-  const __m256d rest_t = _mm256_sub_pd(one, t);
+  const __m256 s = places.along_first;
+  const __m256 t = places.along_second;
+  const __m256 rest_s = _mm256_sub_ps(one, s);
+  const __m256 rest_t = _mm256_sub_ps(one, t);
   return Interpolate(Interpolate(low.first, low.second, t, rest_t),
                      Interpolate(high.first, high.second, t, rest_t), s, rest_s);
 }
 
-// For each subset of four kept: the indices of its members, in order, followed by arbitrary values.
-alignas(16) constexpr int32_t kKeptFirst[16][4] = {
+// For each subset of four: the indices of its members, in order, followed by arbitrary values.
+alignas(16) constexpr int32_t kMembers[16][4] = {
     {0, 0, 0, 0}, {0, 0, 0, 0}, {1, 0, 0, 0}, {0, 1, 0, 0}, {2, 0, 0, 0}, {0, 2, 0, 0},
     {1, 2, 0, 0}, {0, 1, 2, 0}, {3, 0, 0, 0}, {0, 3, 0, 0}, {1, 3, 0, 0}, {0, 1, 3, 0},
     {2, 3, 0, 0}, {0, 2, 3, 0}, {1, 2, 3, 0}, {0, 1, 2, 3}};
 
+// Writes the indices of the members of a subset of four, shifted by `first`. Returns their end; up
+// to four places beyond are overwritten.
+[[gnu::target("avx2"), gnu::always_inline]] inline uint32_t* WriteMembers(unsigned subset,
+                                                                          size_t first,
+                                                                          uint32_t* end) {
+  const __m128i members = _mm_load_si128(reinterpret_cast<const __m128i*>(kMembers[subset]));
+  _mm_storeu_si128(reinterpret_cast<__m128i*>(end),
+                   _mm_add_epi32(members, _mm_set1_epi32(static_cast<int>(first))));
+  return end + std::popcount(subset);
+}
+
 }  // namespace
 
-// IsCertainlyInside for four points together. Writes the survivors' indices to `end` and advances
+// IsCertainlyInside for eight points together. Writes the survivors' indices to `end` and advances
 // it beyond them, without branching on the result; up to four places beyond are overwritten.
 // Returns the number of points processed.
 __attribute__((target("avx2"))) size_t DirectionMap::WriteSurvivorsAvx2(
     std::span<const Vector> points, uint32_t*& end) const {
   // Local copies: for the compiler, the stores of the loop might alias members.
-  const FrameOfFour frame(frame_);
-  const GridOfFour grid(n_);
+  const FrameOfEight frame(frame_);
+  const GridOfEight grid(static_cast<float>(n_));
+  const __m256 limit = _mm256_set1_ps(limit_);
   const int resolution = n_;
-  const double* const gauges = gauges_.data();
+  const float* const gauges = gauges_.data();
+  uint32_t* survivor = end;
   size_t i = 0;
-  for (; i + 4 <= points.size(); i += 4) {
-    const FourPlaces places(frame.ToMap(LoadFour(&points[i])), grid);
-    const __m256d gauge = GaugesAt(places, gauges, resolution);
-    const __m256d inside = _mm256_and_pd(
-        _mm256_cmp_pd(_mm256_mul_pd(places.distance, gauge), _mm256_set1_pd(1), _CMP_LT_OQ),
-        places.in_range);
-    const auto kept = static_cast<unsigned>(~_mm256_movemask_pd(inside)) & 0b1111;
-    const __m128i numbers = _mm_load_si128(reinterpret_cast<const __m128i*>(kKeptFirst[kept]));
-    _mm_storeu_si128(reinterpret_cast<__m128i*>(end),
-                     _mm_add_epi32(numbers, _mm_set1_epi32(static_cast<int>(i))));
-    end += std::popcount(kept);
+  for (; i + 8 <= points.size(); i += 8) {
+    const EightPlaces places(frame.ToMap(&points[i]), grid);
+    const __m256 gauge = GaugesAt(places, gauges, resolution);
+    const __m256 inside = _mm256_and_ps(
+        _mm256_cmp_ps(_mm256_mul_ps(places.distance, gauge), limit, _CMP_LT_OQ), places.in_range);
+    const auto kept = ~static_cast<unsigned>(_mm256_movemask_ps(inside)) & 0xFF;
+    survivor = WriteMembers(kept & 0b1111, i, survivor);
+    survivor = WriteMembers(kept >> 4, i + 4, survivor);
   }
+  end = survivor;
   return i;
 }
 #else

@@ -16,29 +16,32 @@
 
 namespace hulld {
 
-// The coordinates in which a map measures a set: q = L (p - center), L a lower triangular matrix.
-// For a set that is flat or slender in any direction, L makes it about equally wide in all
-// directions, so that the cells of a map divide its surface evenly. L is exactly the matrix of its
-// doubles, so its rounding is irrelevant.
+// The coordinates in which a map measures a set: q = L (p - center), L a lower triangular matrix,
+// rounded to floats. L scales the set to a size near 1. For a set that is flat or slender in any
+// direction, L also makes it about equally wide in all directions, so that the cells of a map
+// divide its surface evenly. L is exactly the matrix of its doubles, so its rounding is irrelevant.
 class MapFrame {
  public:
-  // L = 1.
-  explicit MapFrame(const Vector& center) : center_(center) {}
+  // L is 1 / size, rounded to a power of two. size: largest distance of the set from the center,
+  // by components.
+  MapFrame(const Vector& center, double size);
   // Builds the frame that maps points with these second moments about `center`, the sums of the
   // products of their differences, to points equally spread in all directions, times a factor; |L|
-  // is at most 1, component by component. L = 1 if the points are already nearly so spread, if they
-  // are so flat that rounding would matter, or if the moments are not finite.
-  MapFrame(const Vector& center, const Eigen::Matrix3d& moments);
+  // is at most about 1 / size, component by component. L is as without moments if the points are
+  // already nearly so spread, if they are so flat that rounding would matter, or if the moments are
+  // not finite. `moments` may be multiplied by any factor.
+  MapFrame(const Vector& center, double size, const Eigen::Matrix3d& moments);
 
   const Vector& center() const { return center_; }
   bool is_plain() const { return is_plain_; }
   Eigen::Matrix3d matrix() const;
   // Returns L (p - center), rounded. An overflow yields an infinite or NaN component.
-  Vector ToMap(const Vector& point) const {
+  Eigen::Vector3f ToMap(const Vector& point) const {
     const Vector v = point - center_;
-    if (is_plain_) return v;
     const auto& [xx, yx, yy, zx, zy, zz] = entries_;
-    return {xx * v.x(), yx * v.x() + yy * v.y(), (zx * v.x() + zy * v.y()) + zz * v.z()};
+    if (is_plain_) return (xx * v).cast<float>();
+    return Vector(xx * v.x(), yx * v.x() + yy * v.y(), (zx * v.x() + zy * v.y()) + zz * v.z())
+        .cast<float>();
   }
   // Returns the difference of points that L maps to `direction`, rounded.
   Vector FromMap(const Vector& direction) const;
@@ -46,7 +49,8 @@ class MapFrame {
  private:
   Vector center_;
   // The entries of L, row by row up to the diagonal.
-  std::array<double, 6> entries_ = {1, 0, 1, 0, 0, 1};
+  std::array<double, 6> entries_;
+  // True if L is a multiple of the identity.
   bool is_plain_ = true;
 };
 
@@ -70,9 +74,9 @@ class DirectionMap {
   struct Place {
     size_t cell;
     size_t corner;
-    double along_first;
-    double along_second;
-    double distance;
+    float along_first;
+    float along_second;
+    float distance;
   };
 
   // One cell per face; no point is certainly inside.
@@ -100,26 +104,26 @@ class DirectionMap {
   Place PlaceOf(const Vector& point) const { return PlaceIn(frame_, n_, point); }
   // PlaceOf for a map of any resolution.
   static Place PlaceIn(const MapFrame& frame, int resolution, const Vector& point) {
-    const Vector v = frame.ToMap(point);
+    const Eigen::Vector3f v = frame.ToMap(point);
     const OnCube on_cube(v.x(), v.y(), v.z());
-    const double m = on_cube.largest();
-    if (m == 0) return {0, 0, 0, 0, 0};
+    const float m = on_cube.largest();
     if (!(m >= kMapMinDistance && m <= kMapMaxDistance)) return {0, 0, 0, 0, INFINITY};
-    const double side = resolution;
-    const double half = 0.5 * side;
-    const double scale = half / m;
-    const double first = std::max(0.0, std::min(side, on_cube.first() * scale + half));
-    const double second = std::max(0.0, std::min(side, on_cube.second() * scale + half));
+    const auto side = static_cast<float>(resolution);
+    const float half = 0.5f * side;
+    const float scale = half / m;
+    const float first = std::max(0.0f, std::min(side, on_cube.first() * scale + half));
+    const float second = std::max(0.0f, std::min(side, on_cube.second() * scale + half));
     const int i = std::min(resolution - 1, static_cast<int>(first));
     const int j = std::min(resolution - 1, static_cast<int>(second));
     const auto row = static_cast<uint32_t>(i);
     const auto column = static_cast<uint32_t>(j);
     const auto cells = static_cast<uint32_t>(resolution);
     return {CubeCell(on_cube.face(), cells, row, column),
-            CubeCell(on_cube.face(), cells + 1, row, column), first - i, second - j, m};
+            CubeCell(on_cube.face(), cells + 1, row, column), first - static_cast<float>(i),
+            second - static_cast<float>(j), m};
   }
   bool IsCertainlyInside(const Place& place) const {
-    return rejects_ && place.distance * GaugeAt(place) < 1;
+    return place.distance * GaugeAt(place) < limit_;
   }
 
   uint32_t hint(size_t cell) const { return hints_[cell]; }
@@ -132,7 +136,7 @@ class DirectionMap {
   // is odd.
   bool Coarsen();
   size_t MemoryBytes() const {
-    return gauges_.capacity() * sizeof(double) + hints_.capacity() * sizeof(uint32_t);
+    return gauges_.capacity() * sizeof(float) + hints_.capacity() * sizeof(uint32_t);
   }
 
   // Appends the indices of the points that are not certainly inside, ascending. If the poll stops,
@@ -144,11 +148,11 @@ class DirectionMap {
   size_t corner_count() const {
     return 6 * (static_cast<size_t>(n_) + 1) * (static_cast<size_t>(n_) + 1);
   }
-  double GaugeAt(const Place& place) const {
-    const double* const low = gauges_.data() + place.corner;
-    const double* const high = low + n_ + 1;
-    const double s = place.along_first;
-    const double t = place.along_second;
+  float GaugeAt(const Place& place) const {
+    const float* const low = gauges_.data() + place.corner;
+    const float* const high = low + n_ + 1;
+    const float s = place.along_first;
+    const float t = place.along_second;
     return (low[0] * (1 - t) + low[1] * t) * (1 - s) + (high[0] * (1 - t) + high[1] * t) * s;
   }
   size_t WriteSurvivorsAvx2(std::span<const Vector> points, uint32_t*& end) const;
@@ -156,9 +160,11 @@ class DirectionMap {
   MapFrame frame_;
   int n_;
   double half_;
-  bool rejects_ = false;
-  // By corner: the gauge of its direction, rounded up.
-  std::vector<double> gauges_;
+  // A point whose distance times gauge, in floats, is below this is inside. 0 if rounding could
+  // matter.
+  float limit_ = 0;
+  // By corner: the gauge of its direction.
+  std::vector<float> gauges_;
   std::vector<uint32_t> hints_;
 };
 

@@ -225,7 +225,7 @@ void Surface::SetCenter(const VertexTable& vertices) {
     const Vector unit = (vertices[v] - *interior) / extent_;
     moments += unit * unit.transpose();
   }
-  directions_.emplace(MapFrame(*interior, moments));
+  directions_.emplace(MapFrame(*interior, extent_, moments));
 }
 
 std::optional<Vector> Surface::FindInterior(const VertexTable& vertices) const {

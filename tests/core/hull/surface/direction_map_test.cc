@@ -22,8 +22,8 @@ double BallGauge(const Vector& d) { return d.norm(); }
 // A thin, sheared plate: the octahedron times this.
 const Eigen::Matrix3d kPlate{{2, 0, 0}, {0.3, 1.5, 0}, {-0.7, 1.1, 1e-3}};
 double PlateGauge(const Vector& d) { return OctahedronGauge(kPlate.inverse() * d); }
-MapFrame FrameOfPlate(const Vector& center) {
-  return MapFrame(center, kPlate * kPlate.transpose());
+MapFrame FrameOfPlate(const Vector& center, double size = 2) {
+  return MapFrame(center, size, kPlate * kPlate.transpose());
 }
 
 // Returns a map in `frame` of the set with the given gauge about its center.
@@ -50,7 +50,7 @@ DirectionMap MapOf(const Gauge& gauge, const MapFrame& frame, int resolution) {
 }
 
 DirectionMap MapOf(const Gauge& gauge, const Vector& center, int resolution) {
-  return MapOf(gauge, MapFrame(center), resolution);
+  return MapOf(gauge, MapFrame(center, 1), resolution);
 }
 
 size_t SurvivorCount(const DirectionMap& map, const std::vector<Vector>& points) {
@@ -113,25 +113,40 @@ TEST(DirectionMap, FramesMakeFlatSetsRound) {
 
 TEST(DirectionMap, RoundSetsNeedNoFrame) {
   const Eigen::Matrix3d ball = Eigen::Matrix3d::Identity();
-  EXPECT_TRUE(MapFrame(Vector::Zero(), 7 * ball).is_plain());
-  EXPECT_TRUE(MapFrame(Vector::Zero(), 0 * ball).is_plain());
+  EXPECT_TRUE(MapFrame(Vector::Zero(), 1, 7 * ball).is_plain());
+  EXPECT_TRUE(MapFrame(Vector::Zero(), 1, 0 * ball).is_plain());
   for (const double unusable : {HUGE_VAL, std::nan("")}) {
-    EXPECT_TRUE(MapFrame(Vector::Zero(), unusable * Eigen::Matrix3d::Ones()).is_plain());
+    EXPECT_TRUE(MapFrame(Vector::Zero(), 1, unusable * Eigen::Matrix3d::Ones()).is_plain());
   }
 }
 
 // At any scale. A set without any thickness has no frame.
 TEST(DirectionMap, FramesAreInvertible) {
-  const Vector center(1, 1, 1);
   const Vector direction(0.25, -1, 0.5);
-  for (const double scale : {1e-300, 1.0, 1e300}) {
-    const MapFrame frame(center, scale * kPlate * kPlate.transpose());
-    EXPECT_FALSE(frame.is_plain());
-    EXPECT_EQ(frame.matrix().cwiseAbs().maxCoeff(), 1);
-    EXPECT_GE(frame.matrix().diagonal().minCoeff(), 0x1p-20);
-    EXPECT_LT((frame.ToMap(center + frame.FromMap(direction)) - direction).norm(), 1e-9) << scale;
-    const Vector along(1, 2, -3);
-    EXPECT_TRUE(MapFrame(center, scale * along * along.transpose()).is_plain());
+  for (const double moment : {1e-300, 1.0, 1e300}) {
+    for (const double size : {0x1p-300, 1.0, 0x1p300}) {
+      const Vector center = size * Vector(1, 1, 1);
+      const MapFrame frame(center, size, moment * kPlate * kPlate.transpose());
+      EXPECT_FALSE(frame.is_plain());
+      EXPECT_EQ(frame.matrix().cwiseAbs().maxCoeff() * size, 1);
+      EXPECT_GE(frame.matrix().diagonal().minCoeff() * size, 0x1p-20);
+      const Eigen::Vector3f back = frame.ToMap(center + frame.FromMap(direction));
+      EXPECT_LT((back.cast<double>() - direction).norm(), 1e-6) << moment << " " << size;
+      const Vector along(1, 2, -3);
+      EXPECT_TRUE(MapFrame(center, size, moment * along * along.transpose()).is_plain());
+    }
+  }
+}
+
+// The scale is limited, so that it and its multiples are normal.
+TEST(DirectionMap, FramesScaleSetsToOne) {
+  for (const double size : {0.0, 0x1p-1074, 0x1p-1000, 0.75, 1.0, 0x1p1000, 0x1p1023, HUGE_VAL}) {
+    const MapFrame frame(Vector::Zero(), size);
+    const double scale = frame.matrix()(0, 0);
+    EXPECT_TRUE(std::isnormal(scale)) << size;
+    if (size < 0x1p-1000 || size > 0x1p1000) continue;
+    EXPECT_GE(size * scale, 1);
+    EXPECT_LT(size * scale, 2);
   }
 }
 
@@ -164,14 +179,18 @@ TEST(DirectionMap, KeepsUnmeasurableDirections) {
   for (const Vector& center : {Vector(0, 0, 0), Vector(1e305, -1e305, 1e305)}) {
     // So large that its map is useful around either center.
     const Gauge large = [](const Vector& d) { return PlateGauge(d) / 1e302; };
-    const DirectionMap plate = MapOf(large, FrameOfPlate(center), 8);
+    const DirectionMap plate = MapOf(large, FrameOfPlate(center, 2e302), 8);
     EXPECT_EQ(SurvivorCount(plate, PointsAt(large, center, 0.1, 100)), 0u);
     EXPECT_EQ(SurvivorCount(plate, overflowing), overflowing.size());
   }
-  // A ratio of reaches at which rounding is no longer negligible.
+  // Rounding matters if the ratio of reaches is 1e12, but not if it is 100.
   const Gauge needle = [](const Vector& d) { return Vector(d.x(), 1e12 * d.y(), d.z()).norm(); };
   const DirectionMap slender = MapOf(needle, Vector(0, 0, 0), 8);
   EXPECT_EQ(SurvivorCount(slender, PointsAt(needle, Vector::Zero(), 0.01, 100)), 100u);
+  const Gauge blade = [](const Vector& d) { return Vector(d.x(), 100 * d.y(), d.z()).norm(); };
+  EXPECT_EQ(
+      SurvivorCount(MapOf(blade, Vector::Zero(), 8), PointsAt(blade, Vector::Zero(), 0.01, 100)),
+      0u);
 }
 
 // Expects that both paths keep the same points.
