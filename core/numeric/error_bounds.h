@@ -12,7 +12,7 @@ namespace hulld {
 
 // Unit roundoff: |fl(x op y) - x op y| <= u |x op y| without underflow.
 inline constexpr double kUnitRoundoff = 0x1p-53;
-inline constexpr double kFloatUnitRoundoff = 0x1p-24;
+inline constexpr double kFloatUnitRoundoff = 0x1p-24;  // of floats
 
 // The 3x3 determinant of rounded coordinate differences has the sign of fl(det) if |fl(det)| >
 // fl(factor * fl(permanent)), without underflow. The error itself may be larger, up to 8 u
