@@ -187,10 +187,10 @@ TEST(DirectionMap, KeepsUnmeasurableDirections) {
   const Gauge needle = [](const Vector& d) { return Vector(d.x(), 1e12 * d.y(), d.z()).norm(); };
   const DirectionMap slender = MapOf(needle, Vector(0, 0, 0), 8);
   EXPECT_EQ(SurvivorCount(slender, PointsAt(needle, Vector::Zero(), 0.01, 100)), 100u);
-  const Gauge blade = [](const Vector& d) { return Vector(d.x(), 100 * d.y(), d.z()).norm(); };
-  EXPECT_EQ(
-      SurvivorCount(MapOf(blade, Vector::Zero(), 8), PointsAt(blade, Vector::Zero(), 0.01, 100)),
-      0u);
+  const Gauge blade = [](const Vector& d) { return OctahedronGauge({d.x(), 100 * d.y(), d.z()}); };
+  const DirectionMap sharp = MapOf(blade, Vector(0, 0, 0), 8);
+  EXPECT_EQ(SurvivorCount(sharp, PointsAt(blade, Vector::Zero(), 0.999, 5001)), 0u);
+  EXPECT_EQ(SurvivorCount(sharp, PointsAt(blade, Vector::Zero(), 1, 5001)), 5001u);
 }
 
 // Expects that both paths keep the same points.
