@@ -126,11 +126,12 @@ absl::Status RocksDbStore::DropLostIncarnations() {
   if (lost.ok() && !lost->has_value()) return absl::OkStatus();
   std::unordered_set<uint64_t> known;
   bool certain = true;
-  absl::Status read = ForEachHull([&](const std::string&, const absl::StatusOr<StoredHull>& hull) {
-    certain = certain && hull.ok();
-    if (hull.ok()) known.insert(hull->record.create_revision);
-  });
-  if (!read.ok()) return read;
+  HULLD_RETURN_IF_ERROR(ForEachRecord(
+      [&](const std::string&, const absl::StatusOr<StoredHull>& hull) {
+        certain = certain && hull.ok();
+        if (hull.ok()) known.insert(hull->record.create_revision);
+      },
+      [](const auto&...) {}));
   if (!certain) return absl::OkStatus();
   rocksdb::WriteBatch batch;
   for (const char prefix : {kWriterPrefix, kBasePrefix, kDeltaPrefix}) {
