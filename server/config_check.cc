@@ -10,7 +10,7 @@
 #include "core/base/check.h"
 #include "core/base/status_macros.h"
 #include "server/access/secret_file.h"
-#include "server/access/tls_identity.h"
+#include "server/access/tls.h"
 #include "server/access/token_table.h"
 #include "server/contract/errors.h"
 #include "server/process/listen_address.h"

@@ -11,9 +11,9 @@
 #include <sstream>
 
 #include "core/base/status_macros.h"
+#include "server/access/caller.h"
 #include "server/access/secret_file.h"
 #include "server/contract/errors.h"
-#include "server/contract/hull_id.h"
 
 namespace hulld::server {
 namespace {

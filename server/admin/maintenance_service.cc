@@ -16,7 +16,7 @@
 #include "core/base/status_macros.h"
 #include "hulld/v1/maintenance.grpc.pb.h"
 #include "server/admin/admin_services.h"
-#include "server/call/pulled_stream.h"
+#include "server/call/call_stream.h"
 #include "server/contract/errors.h"
 #include "server/settings/config.h"
 #include "server/store/store_keys.h"

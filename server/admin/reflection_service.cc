@@ -9,7 +9,7 @@
 
 #include "grpc/reflection/v1alpha/reflection.grpc.pb.h"
 #include "server/admin/admin_services.h"
-#include "server/call/pulled_stream.h"
+#include "server/call/call_stream.h"
 
 namespace hulld::server {
 namespace {

@@ -149,7 +149,7 @@ class PairQuery : public std::enable_shared_from_this<PairQuery> {
       if (!table_.is_answerable(i)) return table_.problem(i);
     }
     v1::CheckCollisionResponse& response = call_->response();
-    table_.EncodeHeader(parts_.store, response.mutable_header());
+    EncodeHeader(parts_.store, table_.as_of(), response.mutable_header());
     table_.EncodeHull(*table_.hull_of(kA), response.mutable_hull_a());
     table_.EncodeHull(*table_.hull_of(kB), response.mutable_hull_b());
     search_.emplace(table_, kA, kB, options_, motion_options_);

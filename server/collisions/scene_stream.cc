@@ -21,7 +21,6 @@
 #include "server/collisions/placed/placed_answer.h"
 #include "server/collisions/placed/placement_table.h"
 #include "server/collisions/placed/query_settings.h"
-#include "server/collisions/placed/scene_groups.h"
 #include "server/collisions/ranked_pairs.h"
 #include "server/process/task_pool.h"
 #include "server/registry/registry.h"

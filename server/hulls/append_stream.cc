@@ -12,7 +12,7 @@
 #include "core/base/check.h"
 #include "core/base/status_macros.h"
 #include "hulld/v1/hull.pb.h"
-#include "server/call/queued_stream.h"
+#include "server/call/call_stream.h"
 #include "server/call/service_parts.h"
 #include "server/hulls/hull_service.h"
 #include "server/hulls/in_order.h"

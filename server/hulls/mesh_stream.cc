@@ -9,7 +9,7 @@
 #include "core/base/status_macros.h"
 #include "core/hull/simplification/simplify.h"
 #include "hulld/v1/hull.pb.h"
-#include "server/call/pulled_stream.h"
+#include "server/call/call_stream.h"
 #include "server/call/service_parts.h"
 #include "server/contract/errors.h"
 #include "server/hulls/hull_service.h"

@@ -11,7 +11,7 @@
 
 #include "core/base/status_macros.h"
 #include "hulld/v1/hull.pb.h"
-#include "server/call/pulled_stream.h"
+#include "server/call/call_stream.h"
 #include "server/call/service_parts.h"
 #include "server/hulls/hull_service.h"
 #include "server/registry/watch/change_feed.h"

@@ -482,10 +482,6 @@ void PlacementTable::PlaceAgain(size_t i) {
   if (has_bodies()) bodies_[i] = PlaceBody(i);
 }
 
-void PlacementTable::EncodeHeader(const Store& store, v1::ResponseHeader* header) const {
-  server::EncodeHeader(store, as_of_, header);
-}
-
 size_t PlacementTable::EncodeRows(size_t first, const RowFields& to) const {
   const size_t placements = named_.size() + listed_placements_;
   const size_t rows = table_rows();

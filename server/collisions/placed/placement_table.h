@@ -150,8 +150,8 @@ class PlacementTable {
     return HasHull(i) ? std::optional<size_t>(hull_of_[i]) : std::nullopt;
   }
 
-  // Encodes the revision and staleness of the last Resolve.
-  void EncodeHeader(const Store& store, v1::ResponseHeader* header) const;
+  // Revision and staleness of the last Resolve.
+  const AsOf& as_of() const { return as_of_; }
   // Encodes rows of a table, starting with row `first`, as many as fill a message: a version per
   // placement, or per hull named by packed placements, and the problems; then, if certificates are
   // wanted, the hulls of pieces. Returns the first row of the next message, or table_rows() after

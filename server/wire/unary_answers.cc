@@ -1,4 +1,4 @@
-#include "server/wire/page_token.h"
+#include "server/wire/unary_answers.h"
 
 #include <absl/status/status.h>
 #include <absl/strings/escaping.h>
@@ -7,7 +7,7 @@
 
 #include <vector>
 
-#include "server/contract/hull_id.h"
+#include "server/access/caller.h"
 
 namespace hulld::server {
 namespace {

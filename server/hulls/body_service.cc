@@ -1,5 +1,3 @@
-#include "server/bodies/body_service.h"
-
 #include <absl/strings/str_cat.h>
 
 #include <chrono>
@@ -12,11 +10,12 @@
 #include "server/call/call.h"
 #include "server/call/unary_call.h"
 #include "server/contract/errors.h"
+#include "server/hulls/hull_service.h"
 #include "server/registry/body_resolution.h"
 #include "server/registry/catalog/body.h"
 #include "server/wire/decode.h"
 #include "server/wire/encode.h"
-#include "server/wire/fresh_answer.h"
+#include "server/wire/unary_answers.h"
 
 namespace hulld::server {
 namespace {
@@ -76,7 +75,7 @@ void EncodeBody(const HullChange& body, v1::BodyInfo* message) {
   message->set_damaged(body.damaged);
 }
 
-void AddListed(const HullChange& body, v1::ListBodiesResponse& response) {
+void AddListedBody(const HullChange& body, v1::ListBodiesResponse& response) {
   EncodeBody(body, response.add_bodies());
 }
 
@@ -120,7 +119,7 @@ class BodyService : public BodyServiceOfBytes {
     return UnaryCall<v1::ListBodiesRequest, v1::ListBodiesResponse>::Start(
         context, parts_.admission, Rpc::kListBodies, request, response, [this](auto* call) {
           EndListed(parts_.registry, parts_.readers, call, Rpc::kListBodies, {.bodies = true},
-                    AddListed);
+                    AddListedBody);
         });
   }
 
