@@ -18,6 +18,7 @@
 
 #include "core/base/status_macros.h"
 #include "server/access/secret_file.h"
+#include "server/contract/errors.h"
 
 namespace hulld::server {
 namespace {
@@ -36,7 +37,7 @@ Bio Open(const std::string& text) {
 }
 
 absl::Status Problem(const char* setting, const std::string& path, const std::string& what) {
-  return absl::InvalidArgumentError(absl::StrCat(setting, " ", path, ": ", what));
+  return InvalidArgument(setting, " ", path, ": ", what);
 }
 
 // Returns all certificates of a file, at least one.
@@ -98,12 +99,12 @@ std::string SubjectOf(const X509* certificate) {
 
 absl::StatusOr<TlsIdentity> LoadTlsIdentity(const Config& config) {
   if (config.tls_cert.empty()) {
-    return absl::InvalidArgumentError(
-        absl::StrCat(config.tls_key.empty() ? "--tls-client-ca" : "--tls-key",
-                     " requires --tls-cert, the server's certificate; set all of them or none"));
+    return InvalidArgument(
+        config.tls_key.empty() ? "--tls-client-ca" : "--tls-key",
+        " requires --tls-cert, the server's certificate; set all of them or none");
   }
   if (config.tls_key.empty()) {
-    return absl::InvalidArgumentError("--tls-cert requires --tls-key, its private key; set both");
+    return InvalidArgument("--tls-cert requires --tls-key, its private key; set both");
   }
   TlsIdentity identity;
   HULLD_ASSIGN_OR_RETURN(identity.certificates, ReadSettingFile(config.tls_cert, "--tls-cert"));
@@ -149,10 +150,10 @@ std::string FirstCertificate(const std::string& certificates) {
 absl::Status CheckValidity(const TlsIdentity& identity, std::chrono::system_clock::time_point now) {
   const bool expired = now > identity.not_after;
   if (!expired && now >= identity.not_before) return absl::OkStatus();
-  return absl::InvalidArgumentError(absl::StrCat(
-      "--tls-cert: the certificate of ", identity.subject, expired ? " expired on " : " starts on ",
-      FormatTime(expired ? identity.not_after : identity.not_before),
-      "; clients will reject it; renew it"));
+  return InvalidArgument("--tls-cert: the certificate of ", identity.subject,
+                         expired ? " expired on " : " starts on ",
+                         FormatTime(expired ? identity.not_after : identity.not_before),
+                         "; clients will reject it; renew it");
 }
 
 std::string FormatTime(std::chrono::system_clock::time_point time) {

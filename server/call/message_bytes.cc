@@ -20,9 +20,8 @@ constexpr char kFlag[] = "request-memory";
 constexpr std::chrono::milliseconds kRetry(1000);
 
 absl::Status Malformed(const google::protobuf::Message& message) {
-  return absl::InvalidArgumentError(
-      absl::StrCat("a message is malformed: it is not a ", message.GetTypeName(),
-                   "; check the serializer, and that strings are UTF-8"));
+  return InvalidArgument("a message is malformed: it is not a ", message.GetTypeName(),
+                         "; check the serializer, and that strings are UTF-8");
 }
 
 }  // namespace

@@ -130,8 +130,8 @@ class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchC
   absl::Status HandleOpen(v1::CollisionWatchOpen& open) {
     // Also rejects NaN.
     if (open.has_clearance() && !(open.clearance() >= 0)) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("clearance is ", open.clearance(), "; it must be a length of at least 0"));
+      return InvalidArgument("clearance is ", open.clearance(),
+                             "; it must be a length of at least 0");
     }
     v1::Wanted wanted;
     if (open.has_clearance()) wanted.set_clearance(open.clearance());
@@ -145,7 +145,7 @@ class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchC
     const bool has_groups = open.groups_size() > 0 || open.ignored_group_pairs_size() > 0 ||
                             open.ignore_same_group() || open.has_movers();
     if (open.pairs_size() > 0 && has_groups) {
-      return absl::InvalidArgumentError(
+      return InvalidArgument(
           "pairs cannot be combined with groups or movers; list the pairs, or filter all pairs");
     }
     HULLD_RETURN_IF_ERROR(

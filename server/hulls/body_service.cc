@@ -24,7 +24,7 @@ absl::StatusOr<StoredBody> DecodeBody(const v1::PutBodyRequest& request, const C
                                       uint64_t max_pieces) {
   HULLD_RETURN_IF_ERROR(CheckHullId(caller, request.body_id(), "body_id"));
   if (request.pieces().empty()) {
-    return absl::InvalidArgumentError(
+    return InvalidArgument(
         "pieces is empty; a body needs at least one piece (use DeleteBody to remove a body)");
   }
   const auto count = static_cast<uint64_t>(request.pieces_size());
@@ -39,8 +39,8 @@ absl::StatusOr<StoredBody> DecodeBody(const v1::PutBodyRequest& request, const C
   for (int i = 0; i < request.pieces_size(); ++i) {
     const v1::Placement& piece = request.pieces(i);
     if (piece.has_points()) {
-      return absl::InvalidArgumentError(absl::StrCat(
-          "pieces[", i, "].points is set; a piece must be a registered hull; set its ID"));
+      return InvalidArgument("pieces[", i,
+                             "].points is set; a piece must be a registered hull; set its ID");
     }
     const auto [known, is_new] =
         index_of.try_emplace(piece.hull_id(), static_cast<uint32_t>(body.hull_ids.size()));
@@ -48,14 +48,14 @@ absl::StatusOr<StoredBody> DecodeBody(const v1::PutBodyRequest& request, const C
       const absl::Status valid = CheckHullId(caller, piece.hull_id(), "hull_id");
       if (!valid.ok()) return Prefixed(absl::StrCat("pieces[", i, "]."), valid);
       if (piece.hull_id() == request.body_id()) {
-        return absl::InvalidArgumentError(
-            absl::StrCat("pieces[", i, "].hull_id is the body itself; a piece must be a hull"));
+        return InvalidArgument("pieces[", i,
+                               "].hull_id is the body itself; a piece must be a hull");
       }
       body.hull_ids.push_back(piece.hull_id());
     }
     if (piece.has_end_pose()) {
-      return absl::InvalidArgumentError(absl::StrCat(
-          "pieces[", i, "].end_pose is set; a piece cannot move relative to its body"));
+      return InvalidArgument("pieces[", i,
+                             "].end_pose is set; a piece cannot move relative to its body");
     }
     const Pose pose = ReadPose(piece.pose());
     const absl::Status posed = ValidatePose(pose);

@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "core/base/status_macros.h"
+#include "server/contract/errors.h"
 #include "server/process/random_id.h"
 #include "server/store/store_errors.h"
 #include "server/store/store_keys.h"
@@ -112,7 +113,7 @@ absl::Status RocksDbStore::ReadFailed(const rocksdb::Status& status) {
   const std::string text = absl::StrCat("cannot read: ", status.ToString());
   if (status.IsCorruption()) return absl::DataLossError(text);
   ++read_failures_;
-  return absl::UnavailableError(text);
+  return Unavailable(text);
 }
 
 // Deletes values of incarnations that have no hull, if kLostKey is set: deleting a hull with a
@@ -216,8 +217,7 @@ absl::StatusOr<std::string> RocksDbStore::MakeCopy() {
   std::error_code error;
   std::filesystem::create_directories(directory, error);
   if (error) {
-    return absl::UnavailableError(
-        absl::StrCat("cannot create ", directory, " for the copy: ", error.message()));
+    return Unavailable("cannot create ", directory, " for the copy: ", error.message());
   }
   rocksdb::Checkpoint* created = nullptr;
   rocksdb::Status status = rocksdb::Checkpoint::Create(db_.get(), &created);

@@ -26,6 +26,7 @@
 #include "core/query/terms/query_options.h"
 #include "hulld/v1/collision.pb.h"
 #include "server/access/caller.h"
+#include "server/contract/errors.h"
 #include "server/registry/body_resolution.h"
 #include "server/registry/registry.h"
 #include "server/wire/decode.h"
@@ -270,11 +271,11 @@ absl::Status CheckNoMotions(const google::protobuf::RepeatedPtrField<v1::Placeme
 template <typename Request>
 absl::Status CheckOrder(const Request& request, bool is_open, const char* twice) {
   if (!request.has_open() && !request.has_update()) {
-    return absl::InvalidArgumentError("the message is empty; set open or update");
+    return InvalidArgument("the message is empty; set open or update");
   }
-  if (request.has_open() && is_open) return absl::InvalidArgumentError(twice);
+  if (request.has_open() && is_open) return InvalidArgument(twice);
   if (request.has_open() || is_open) return absl::OkStatus();
-  return absl::InvalidArgumentError("the first message must be open, not update");
+  return InvalidArgument("the first message must be open, not update");
 }
 
 // Validates an update of a stream with `count` placements: the new pose of each of `placements`, as

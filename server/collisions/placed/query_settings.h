@@ -3,7 +3,6 @@
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
-#include <absl/strings/str_cat.h>
 
 #include <cstddef>
 #include <cstdint>
@@ -16,6 +15,7 @@
 #include "hulld/v1/collision.pb.h"
 #include "server/call/call_lifetime.h"
 #include "server/collisions/placed/placement_table.h"
+#include "server/contract/errors.h"
 #include "server/settings/config.h"
 
 namespace hulld::server {
@@ -60,24 +60,20 @@ absl::Status ProofTooLarge(uint64_t certificates, uint64_t limit);
 template <typename Scene>
 absl::Status ValidateGroups(const Scene& scene, size_t placements) {
   if (!scene.groups().empty() && static_cast<size_t>(scene.groups_size()) != placements) {
-    return absl::InvalidArgumentError(absl::StrCat("groups has ", scene.groups_size(),
-                                                   " groups for ", placements,
-                                                   " placements; set one per placement, or none"));
+    return InvalidArgument("groups has ", scene.groups_size(), " groups for ", placements,
+                           " placements; set one per placement, or none");
   }
   if (scene.ignored_group_pairs_size() % 2 != 0) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("ignored_group_pairs has an odd number of groups, ",
-                     scene.ignored_group_pairs_size(), "; each pair needs two"));
+    return InvalidArgument("ignored_group_pairs has an odd number of groups, ",
+                           scene.ignored_group_pairs_size(), "; each pair needs two");
   }
   if (scene.groups().empty() &&
       (scene.ignore_same_group() || !scene.ignored_group_pairs().empty())) {
-    return absl::InvalidArgumentError(
-        absl::StrCat(scene.ignore_same_group() ? "ignore_same_group" : "ignored_group_pairs",
-                     " requires groups; set one per placement"));
+    return InvalidArgument(scene.ignore_same_group() ? "ignore_same_group" : "ignored_group_pairs",
+                           " requires groups; set one per placement");
   }
   if (scene.movers() > placements) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("movers is ", scene.movers(), ", but ", PlacementCountText(placements)));
+    return InvalidArgument("movers is ", scene.movers(), ", but ", PlacementCountText(placements));
   }
   return absl::OkStatus();
 }

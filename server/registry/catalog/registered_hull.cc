@@ -402,11 +402,11 @@ absl::Status Gone(const std::string& id, const char* how) {
 }
 
 absl::Status StoreDisagrees(const HullRecord& record) {
-  return absl::UnavailableError(absl::StrCat(
+  return Unavailable(
       "the store does not contain ", Quoted("hull", record.hull_id), " as of revision ",
       record.revision,
       ", the last known to this server; if this persists, the database was changed outside of "
-      "hulld: restart this server"));
+      "hulld: restart this server");
 }
 
 }  // namespace hulld::server

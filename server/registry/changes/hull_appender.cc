@@ -316,7 +316,7 @@ absl::StatusOr<LocalChanges::BuiltChunk> LocalChanges::Build(Locked& locked, Reg
   if (hull.state.work() == HullState::Work::kReverting) {
     hull.DiscardBuilder(locked);
     if (peers_.has_peers()) return Superseded();
-    return absl::UnavailableError("an earlier change could not be stored");
+    return Unavailable("an earlier change could not be stored");
   }
   if (!added.ok()) return BuildFailure(hull, added.status());
   if (hull.state.damaged()) {

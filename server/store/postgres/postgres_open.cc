@@ -372,7 +372,7 @@ absl::Status PostgresStore::WaitForTurn() {
   if (options_.take_over) return absl::OkStatus();
   // Retries quickly at first: a server that was just killed may still hold the lock.
   for (auto pause = kMinLockPause;; pause = std::min(2 * pause, kMaxLockPause)) {
-    absl::StatusOr<bool> locked = absl::UnavailableError("");
+    absl::StatusOr<bool> locked = Unavailable("");
     if (keeper_session_ != nullptr) locked = TryLock(*keeper_session_);
     has_lock_ = locked.ok() && *locked;
     if (has_lock_) return absl::OkStatus();

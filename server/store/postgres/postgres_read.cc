@@ -1,12 +1,12 @@
 // Reading from the store: records, vertices of a hull, a writer's sequence.
 #include <absl/status/status.h>
-#include <absl/strings/str_cat.h>
 
 #include <algorithm>
 #include <optional>
 #include <utility>
 
 #include "core/base/status_macros.h"
+#include "server/contract/errors.h"
 #include "server/store/postgres/postgres_store.h"
 #include "server/store/store_keys.h"
 
@@ -71,8 +71,7 @@ absl::StatusOr<std::vector<Rows>> PostgresStore::Read(std::vector<Statement> sta
   absl::StatusOr<std::vector<Rows>> rows = readers_.Execute(statements);
   if (!rows.ok()) {
     ++read_failures_;
-    return absl::UnavailableError(
-        absl::StrCat("cannot read from the database: ", rows.status().message()));
+    return Unavailable("cannot read from the database: ", rows.status().message());
   }
   const Rows owner = std::move(rows->back());
   rows->pop_back();

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "core/base/status_macros.h"
+#include "server/contract/errors.h"
 #include "server/process/random_id.h"
 #include "server/store/postgres/batch_statements.h"
 #include "server/store/store_errors.h"
@@ -53,10 +54,9 @@ absl::StatusOr<std::string> PostgresStore::Owner(Session& session) const {
 }
 
 absl::Status PostgresStore::Superseded(std::string_view owner) {
-  return absl::UnavailableError(
-      absl::StrCat("another hulld took over the store", owner.empty() ? "" : " (",
-                   std::string(owner), owner.empty() ? "" : ")",
-                   ": this server exits without changing anything; connect to the other one"));
+  return Unavailable("another hulld took over the store", owner.empty() ? "" : " (",
+                     std::string(owner), owner.empty() ? "" : ")",
+                     ": this server exits without changing anything; connect to the other one");
 }
 
 void PostgresStore::RunKeeper() {
@@ -169,12 +169,11 @@ void PostgresStore::OnEnded(std::function<void()> ended) {
 }
 
 absl::Status PostgresStore::OutcomeUnknown(const absl::Status& cause) const {
-  return absl::UnavailableError(
-      absl::StrCat("lost the database connection during COMMIT (", cause.message(),
-                   "), and the outcome is still unknown: ",
-                   options_.shared ? "the change may or may not be committed"
-                                   : "the change is not visible, but may appear after a restart",
-                   "; check whether it is there before you retry"));
+  return Unavailable("lost the database connection during COMMIT (", cause.message(),
+                     "), and the outcome is still unknown: ",
+                     options_.shared ? "the change may or may not be committed"
+                                     : "the change is not visible, but may appear after a restart",
+                     "; check whether it is there before you retry");
 }
 
 absl::Status PostgresStore::Refused(const absl::Status& cause) {
@@ -300,11 +299,10 @@ absl::StatusOr<bool> PostgresStore::Reclaim(uint64_t batch) {
   // store.
   HULLD_RETURN_IF_ERROR(
       writer_->Execute({.name = "hulld_rename", .parameters = {RandomId()}}).status());
-  End(absl::UnavailableError(
-      absl::StrCat("the database has lost ", batch_ - found,
-                   " batches committed by this server (failover to a lagging standby, a restored "
-                   "backup, or an outage with synchronous_commit = off); this server exits; after "
-                   "a restart the remaining data is served under a new store ID")));
+  End(Unavailable("the database has lost ", batch_ - found,
+                  " batches committed by this server (failover to a lagging standby, a restored "
+                  "backup, or an outage with synchronous_commit = off); this server exits; after "
+                  "a restart the remaining data is served under a new store ID"));
   return false;
 }
 
@@ -315,8 +313,8 @@ absl::StatusOr<bool> PostgresStore::OutcomeBeforePeers(uint64_t batch) {
       writer_->Execute({.name = "hulld_next_epoch", .parameters = {EncodeBigint(epoch())}}));
   if (next.count() == 0) {
     End(
-        absl::UnavailableError("the database was restored to a state before this server became "
-                               "active; this server exits"));
+        Unavailable("the database was restored to a state before this server became "
+                    "active; this server exits"));
     return false;
   }
   End(Superseded(""));
@@ -377,7 +375,7 @@ absl::Status PostgresStore::Recover() {
   }
   unknown_ = absl::OkStatus();
   if (*committed) {
-    End(absl::UnavailableError(
+    End(Unavailable(
         "the database committed changes whose outcome was reported as unknown; this server's "
         "memory is stale, so it exits; restart it to serve them"));
   }
