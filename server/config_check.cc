@@ -10,7 +10,7 @@
 #include "core/base/check.h"
 #include "core/base/status_macros.h"
 #include "server/access/secret_file.h"
-#include "server/access/tls_identity.h"
+#include "server/access/tls.h"
 #include "server/access/token_table.h"
 #include "server/contract/errors.h"
 #include "server/process/listen_address.h"
@@ -55,7 +55,7 @@ absl::StatusOr<std::vector<std::string>> CheckConfig(const Config& config,
 
 absl::Status CheckDataDir(const std::string& path) {
   const auto problem = [&path](const std::string& where, const std::string& what) {
-    return absl::InvalidArgumentError(absl::StrCat("--data-dir ", path, ": ", where, " ", what));
+    return InvalidArgument("--data-dir ", path, ": ", where, " ", what);
   };
   // A missing directory will be created in its nearest existing parent.
   std::error_code error;

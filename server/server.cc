@@ -21,7 +21,6 @@
 #include "hulld/v1/status.grpc.pb.h"
 #include "server/access/secret_file.h"
 #include "server/admin/admin_services.h"
-#include "server/bodies/body_service.h"
 #include "server/call/transport.h"
 #include "server/collisions/collision_service.h"
 #include "server/config_check.h"

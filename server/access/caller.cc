@@ -1,16 +1,19 @@
 #include "server/access/caller.h"
 
+#include <absl/strings/ascii.h>
 #include <absl/strings/escaping.h>
 #include <absl/strings/str_cat.h>
 
 #include "core/base/status_macros.h"
 #include "server/contract/errors.h"
-#include "server/contract/hull_id.h"
 #include "server/contract/rpc.h"
 #include "server/settings/config.h"
 
 namespace hulld::server {
 namespace {
+
+// Independent of the locale.
+bool IsInner(char c) { return absl::ascii_isalnum(c) || c == '.' || c == '_' || c == '-'; }
 
 absl::Status OutsidePrefix(const Caller& caller, const std::string& field,
                            const std::string& value) {
@@ -22,6 +25,29 @@ absl::Status OutsidePrefix(const Caller& caller, const std::string& field,
 }
 
 }  // namespace
+
+absl::Status CheckHullIdSyntax(const std::string& id, const std::string& field) {
+  if (id.empty()) return InvalidArgument(field, " is empty; give an ID");
+  if (id.size() > Config::kMaxIdCharacters) {
+    return InvalidArgument(field, " has ", id.size(), " characters; the limit is ",
+                           Config::kMaxIdCharacters);
+  }
+  bool segment_start = true;
+  for (size_t i = 0; i <= id.size(); ++i) {
+    const bool at_end = i == id.size() || id[i] == '/';
+    if (at_end && segment_start) {
+      return InvalidArgument(field, " \"", absl::Utf8SafeCEscape(id),
+                             "\" has an empty segment at character ", i);
+    }
+    if (!at_end && !(segment_start ? absl::ascii_isalnum(id[i]) : IsInner(id[i]))) {
+      return InvalidArgument(field, " \"", absl::Utf8SafeCEscape(id),
+                             "\" is malformed at character ", i,
+                             "; IDs are segments of [A-Za-z0-9][A-Za-z0-9._-]* joined by \"/\"");
+    }
+    segment_start = at_end;
+  }
+  return absl::OkStatus();
+}
 
 const char* RoleName(Permission permission) {
   static constexpr const char* kNames[] = {"none", "read-only", "read-write", "admin"};
@@ -46,8 +72,8 @@ absl::Status CheckHullId(const Caller& caller, const std::string& id, const std:
 
 absl::StatusOr<std::string> PrefixToList(const Caller& caller, const std::string& prefix) {
   if (prefix.size() > Config::kMaxIdCharacters) {
-    return absl::InvalidArgumentError(absl::StrCat(
-        "prefix has ", prefix.size(), " characters; the limit is ", Config::kMaxIdCharacters));
+    return InvalidArgument("prefix has ", prefix.size(), " characters; the limit is ",
+                           Config::kMaxIdCharacters);
   }
   if (prefix.starts_with(caller.prefix)) return prefix;
   if (caller.prefix.starts_with(prefix)) return caller.prefix;

@@ -42,6 +42,11 @@ absl::Status CheckHullId(const Caller& caller, const std::string& id, const std:
 // than any ID. PERMISSION_DENIED: no ID that starts with `prefix` is visible to the caller.
 absl::StatusOr<std::string> PrefixToList(const Caller& caller, const std::string& prefix);
 
+// Returns OK if `id` is segments of [A-Za-z0-9][A-Za-z0-9._-]* joined by "/", at most 256
+// characters; otherwise INVALID_ARGUMENT naming `field` (as in "a.hull_id") and the offending
+// character. IDs of requests go through CheckHullId, which also checks the caller's prefix.
+absl::Status CheckHullIdSyntax(const std::string& id, const std::string& field);
+
 }  // namespace hulld::server
 
 #endif  // HULLD_SERVER_ACCESS_CALLER_H_

@@ -13,7 +13,7 @@
 #include <string>
 
 #include "server/access/caller.h"
-#include "server/access/tls_credentials.h"
+#include "server/access/tls.h"
 #include "server/access/token_table.h"
 #include "server/process/periodic_task.h"
 #include "server/settings/config.h"

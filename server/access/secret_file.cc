@@ -1,7 +1,6 @@
 #include "server/access/secret_file.h"
 
 #include <absl/status/status.h>
-#include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -10,6 +9,7 @@
 #include <cerrno>
 #include <cstring>
 
+#include "server/contract/errors.h"
 #include "server/process/descriptors.h"
 
 namespace hulld::server {
@@ -18,7 +18,7 @@ namespace {
 constexpr size_t kMaxBytes = 1 << 20;
 
 absl::Status Problem(const std::string& setting, const std::string& path, const std::string& what) {
-  return absl::InvalidArgumentError(absl::StrCat(setting, " ", path, ": ", what));
+  return InvalidArgument(setting, " ", path, ": ", what);
 }
 
 // Returns an empty string if only this user has access, or, for a file owned by root, its group.

@@ -11,9 +11,9 @@
 #include <sstream>
 
 #include "core/base/status_macros.h"
+#include "server/access/caller.h"
 #include "server/access/secret_file.h"
 #include "server/contract/errors.h"
-#include "server/contract/hull_id.h"
 
 namespace hulld::server {
 namespace {
@@ -36,8 +36,8 @@ std::optional<Permission> ReadRole(const std::string& text) {
 absl::StatusOr<std::string> ReadPrefix(const std::string& text) {
   if (text == "*") return "";
   if (!text.ends_with("/")) {
-    return absl::InvalidArgumentError(absl::StrCat("the prefix \"", absl::Utf8SafeCEscape(text),
-                                                   "\" must end in \"/\"; use \"*\" for all IDs"));
+    return InvalidArgument("the prefix \"", absl::Utf8SafeCEscape(text),
+                           "\" must end in \"/\"; use \"*\" for all IDs");
   }
   HULLD_RETURN_IF_ERROR(CheckHullIdSyntax(text.substr(0, text.size() - 1), "the prefix"));
   return text;
@@ -68,22 +68,20 @@ absl::Status TokenTable::AddLine(const std::string& line) {
   std::string hash;
   std::string more;
   if (!(words >> role >> prefix >> hash) || words >> more) {
-    return absl::InvalidArgumentError(
+    return InvalidArgument(
         "expected four fields: name, role, prefix, and sha256:HASH, as 'hullctl token new' prints "
         "them");
   }
   if (!IsName(name)) {
-    return absl::InvalidArgumentError(
+    return InvalidArgument(
         "the name (first field) must have at most 64 characters of [A-Za-z0-9._-] and start with a "
-        "letter or "
-        "digit");
+        "letter or digit");
   }
   Entry entry;
   entry.caller.name = name;
   const std::optional<Permission> permission = ReadRole(role);
   if (!permission.has_value()) {
-    return absl::InvalidArgumentError(
-        "the role (second field) must be read-only, read-write, or admin");
+    return InvalidArgument("the role (second field) must be read-only, read-write, or admin");
   }
   entry.caller.permission = *permission;
   HULLD_ASSIGN_OR_RETURN(entry.caller.prefix, ReadPrefix(prefix));
@@ -91,7 +89,7 @@ absl::Status TokenTable::AddLine(const std::string& line) {
                        hash.size() == sizeof kHashScheme - 1 + 2 * entry.hash.size() &&
                        IsHex(hash.substr(sizeof kHashScheme - 1));
   if (!is_hash) {
-    return absl::InvalidArgumentError(
+    return InvalidArgument(
         "the hash (last field) must be sha256: and 64 hexadecimal digits; never store the token "
         "itself ('hullctl token hash' prints its hash)");
   }
@@ -102,13 +100,11 @@ absl::Status TokenTable::AddLine(const std::string& line) {
   }
   for (const Entry& other : entries_) {
     if (other.caller.name == name) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("the name \"", name, "\" is already used in an earlier line"));
+      return InvalidArgument("the name \"", name, "\" is already used in an earlier line");
     }
     if (other.hash == entry.hash) {
-      return absl::InvalidArgumentError(absl::StrCat("\"", name, "\" has the token of \"",
-                                                     other.caller.name,
-                                                     "\"; each name needs a token of its own"));
+      return InvalidArgument("\"", name, "\" has the token of \"", other.caller.name,
+                             "\"; each name needs a token of its own");
     }
   }
   entries_.push_back(std::move(entry));
@@ -137,10 +133,10 @@ absl::StatusOr<TokenTable> ReadTokensFile(const std::string& path, bool may_be_e
   absl::StatusOr<TokenTable> table = TokenTable::Parse(text);
   if (!table.ok()) return Prefixed(absl::StrCat("--tokens-file ", path, ": "), table.status());
   if (table->empty() && !may_be_empty) {
-    return absl::InvalidArgumentError(absl::StrCat(
+    return InvalidArgument(
         "--tokens-file ", path,
         ": it contains no token, so every call would be refused; add one with 'hullctl token "
-        "new'"));
+        "new'");
   }
   return table;
 }

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <iostream>
+#include <iterator>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -53,9 +54,14 @@ Report ExamineAll(RocksDbStore& store) {
   report.store_id = store.id();
   report.revision = store.revision();
   std::vector<std::pair<std::string, absl::StatusOr<StoredHull>>> hulls;
-  const absl::Status read =
-      store.ForEachHull([&](const std::string& id, absl::StatusOr<StoredHull> stored) {
+  std::vector<Finding> of_bodies;
+  const absl::Status read = store.ForEachRecord(
+      [&](const std::string& id, absl::StatusOr<StoredHull> stored) {
         hulls.emplace_back(id, std::move(stored));
+      },
+      [&](const std::string& id, const absl::StatusOr<StoredBody>& stored) {
+        ++report.bodies;
+        if (!stored.ok()) of_bodies.push_back({id, std::string(stored.status().message())});
       });
   for (const auto& [id, stored] : hulls) {
     ++report.hulls;
@@ -63,15 +69,8 @@ Report ExamineAll(RocksDbStore& store) {
     if (stored.ok()) report.vertices += stored->record.vertex_count;
     if (!status.ok()) report.findings.push_back({id, std::string(status.message())});
   }
-  const absl::Status bodies_read =
-      store.ForEachBody([&](const std::string& id, const absl::StatusOr<StoredBody>& stored) {
-        ++report.bodies;
-        if (stored.ok()) return;
-        report.findings.push_back({id, std::string(stored.status().message())});
-      });
-  for (const absl::Status& status : {read, bodies_read}) {
-    if (!status.ok()) report.failure = std::string(status.message());
-  }
+  std::ranges::move(of_bodies, std::back_inserter(report.findings));
+  if (!read.ok()) report.failure = std::string(read.message());
   return report;
 }
 
@@ -110,12 +109,6 @@ void PrintText(const Report& report) {
   std::fputs(summary.c_str(), stdout);
 }
 
-absl::Status AcceptLoss(RocksDbOptions options) {
-  options.read_only = false;
-  options.accept_loss = true;
-  return RocksDbStore::Open(std::move(options)).status();
-}
-
 }  // namespace
 
 int RunDoctor(const std::vector<std::string>& arguments) {
@@ -140,7 +133,10 @@ int RunDoctor(const std::vector<std::string>& arguments) {
   }
   absl::StatusOr<std::unique_ptr<RocksDbStore>> store = RocksDbStore::Open(options);
   if (accept_loss && absl::IsDataLoss(store.status())) {
-    const absl::Status accepted = AcceptLoss(options);
+    RocksDbOptions accepting = options;
+    accepting.read_only = false;
+    accepting.accept_loss = true;
+    const absl::Status accepted = RocksDbStore::Open(std::move(accepting)).status();
     store = accepted.ok() ? RocksDbStore::Open(options) : accepted;
   }
   if (!store.ok()) {

@@ -6,9 +6,8 @@
 #include <optional>
 #include <utility>
 
+#include "server/call/call_stream.h"
 #include "server/call/message_bytes.h"
-#include "server/call/queued_stream.h"
-#include "server/call/request_memory.h"
 #include "server/contract/errors.h"
 
 namespace hulld::server {

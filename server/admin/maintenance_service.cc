@@ -16,7 +16,7 @@
 #include "core/base/status_macros.h"
 #include "hulld/v1/maintenance.grpc.pb.h"
 #include "server/admin/admin_services.h"
-#include "server/call/pulled_stream.h"
+#include "server/call/call_stream.h"
 #include "server/contract/errors.h"
 #include "server/settings/config.h"
 #include "server/store/store_keys.h"
@@ -64,7 +64,7 @@ class BackupStream : public RequestStream<PulledStream<WriteReactor, v1::SaveBac
       }
     }
     if (error) {
-      return absl::UnavailableError(absl::StrCat("cannot list the copy: ", error.message()));
+      return Unavailable("cannot list the copy: ", error.message());
     }
     std::sort(files_.rbegin(), files_.rend());
     spdlog::info("sending a backup of the store");
@@ -100,9 +100,7 @@ class BackupStream : public RequestStream<PulledStream<WriteReactor, v1::SaveBac
 
   absl::StatusOr<bool> NextPiece() {
     const std::string& path = files_.back();
-    const auto failure = [&] {
-      return absl::UnavailableError(absl::StrCat("cannot read ", path, " of the copy"));
-    };
+    const auto failure = [&] { return Unavailable("cannot read ", path, " of the copy"); };
     if (offset_ == 0) {
       file_ = std::ifstream(directory_ + "/" + path, std::ios::binary);
       if (!file_) return failure();

@@ -9,7 +9,8 @@
 
 #include "grpc/reflection/v1alpha/reflection.grpc.pb.h"
 #include "server/admin/admin_services.h"
-#include "server/call/pulled_stream.h"
+#include "server/call/call_stream.h"
+#include "server/contract/errors.h"
 
 namespace hulld::server {
 namespace {
@@ -50,8 +51,7 @@ class ReflectionStream
   void OnMessage() override {
     // The reply repeats the request.
     if (request().ByteSizeLong() > kMaxRequestBytes) {
-      return FinishCall(absl::InvalidArgumentError(
-          absl::StrCat("the request has more than ", kMaxRequestBytes, " bytes")));
+      return FinishCall(InvalidArgument("the request has more than ", kMaxRequestBytes, " bytes"));
     }
     reply().set_valid_host(request().host());
     *reply().mutable_original_request() = request();

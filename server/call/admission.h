@@ -20,7 +20,7 @@
 
 #include "server/access/caller.h"
 #include "server/call/call_lifetime.h"
-#include "server/call/request_memory.h"
+#include "server/call/message_bytes.h"
 #include "server/contract/rpc.h"
 #include "server/network/connection_table.h"
 #include "server/process/fair_queue.h"

@@ -4,22 +4,44 @@
 #include <grpcpp/impl/codegen/proto_utils.h>
 #include <grpcpp/support/slice.h>
 
+#include <chrono>
 #include <string_view>
 
 #include "core/base/check.h"
 #include "core/base/status_macros.h"
 #include "server/call/message_layout.h"
+#include "server/contract/errors.h"
 
 namespace hulld::server {
 namespace {
 
+constexpr char kFlag[] = "request-memory";
+// A large request takes about as long as a batch.
+constexpr std::chrono::milliseconds kRetry(1000);
+
 absl::Status Malformed(const google::protobuf::Message& message) {
-  return absl::InvalidArgumentError(
-      absl::StrCat("a message is malformed: it is not a ", message.GetTypeName(),
-                   "; check the serializer, and that strings are UTF-8"));
+  return InvalidArgument("a message is malformed: it is not a ", message.GetTypeName(),
+                         "; check the serializer, and that strings are UTF-8");
 }
 
 }  // namespace
+
+absl::Status RequestMemory::Take(uint64_t bytes, Share& share) {
+  share.Release();
+  if (bytes > limit_bytes_) {
+    return LimitExceeded(absl::StrCat("the message would take more than ", limit_bytes_,
+                                      " bytes of memory; split it into smaller messages"),
+                         limit_bytes_, kFlag);
+  }
+  const uint64_t taken = taken_.fetch_add(bytes, std::memory_order_relaxed) + bytes;
+  if (taken > limit_bytes_) {
+    taken_.fetch_sub(bytes, std::memory_order_relaxed);
+    return Overloaded("requests in flight use all request memory", limit_bytes_, kFlag, kRetry);
+  }
+  share.memory_ = this;
+  share.bytes_ = bytes;
+  return absl::OkStatus();
+}
 
 absl::Status ParseRequest(Bytes& bytes, RequestMemory& memory, google::protobuf::Message* message,
                           RequestMemory::Share& share) {

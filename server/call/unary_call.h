@@ -8,7 +8,6 @@
 
 #include "server/call/call.h"
 #include "server/call/message_bytes.h"
-#include "server/call/request_memory.h"
 #include "server/process/task_pool.h"
 
 namespace hulld::server {

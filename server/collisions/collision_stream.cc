@@ -16,7 +16,7 @@
 #include "core/base/status_macros.h"
 #include "core/query/collision.h"
 #include "hulld/v1/collision.pb.h"
-#include "server/call/pulled_stream.h"
+#include "server/call/call_stream.h"
 #include "server/call/service_parts.h"
 #include "server/collisions/claimed_range.h"
 #include "server/collisions/collision_service.h"
@@ -222,7 +222,7 @@ class CollisionStream
     if (!status.ok()) return FinishCall(OrStopped(status));
     request().Clear();
     pairs_.SortSelected();
-    table_.EncodeHeader(parts_.store, reply().mutable_header());
+    EncodeHeader(parts_.store, table_.as_of(), reply().mutable_header());
     reply_bytes_ = reply().ByteSizeLong();
     call().AddPairs(pairs_.selected().size());
     AnswerSlice();

@@ -14,14 +14,13 @@
 #include "core/base/status_macros.h"
 #include "core/query/collision.h"
 #include "hulld/v1/collision.pb.h"
-#include "server/call/queued_stream.h"
+#include "server/call/call_stream.h"
 #include "server/call/service_parts.h"
 #include "server/collisions/collision_service.h"
 #include "server/collisions/placed/live_pairs.h"
 #include "server/collisions/placed/placed_answer.h"
 #include "server/collisions/placed/placement_table.h"
 #include "server/collisions/placed/query_settings.h"
-#include "server/collisions/placed/scene_groups.h"
 #include "server/collisions/watched_hulls.h"
 #include "server/contract/errors.h"
 #include "server/process/task_pool.h"
@@ -131,8 +130,8 @@ class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchC
   absl::Status HandleOpen(v1::CollisionWatchOpen& open) {
     // Also rejects NaN.
     if (open.has_clearance() && !(open.clearance() >= 0)) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("clearance is ", open.clearance(), "; it must be a length of at least 0"));
+      return InvalidArgument("clearance is ", open.clearance(),
+                             "; it must be a length of at least 0");
     }
     v1::Wanted wanted;
     if (open.has_clearance()) wanted.set_clearance(open.clearance());
@@ -146,7 +145,7 @@ class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchC
     const bool has_groups = open.groups_size() > 0 || open.ignored_group_pairs_size() > 0 ||
                             open.ignore_same_group() || open.has_movers();
     if (open.pairs_size() > 0 && has_groups) {
-      return absl::InvalidArgumentError(
+      return InvalidArgument(
           "pairs cannot be combined with groups or movers; list the pairs, or filter all pairs");
     }
     HULLD_RETURN_IF_ERROR(

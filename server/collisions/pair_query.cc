@@ -1,5 +1,4 @@
 #include <absl/status/status.h>
-#include <absl/strings/str_cat.h>
 
 #include <algorithm>
 #include <memory>
@@ -18,6 +17,7 @@
 #include "server/collisions/placed/placed_answer.h"
 #include "server/collisions/placed/placement_table.h"
 #include "server/collisions/placed/query_settings.h"
+#include "server/contract/errors.h"
 #include "server/process/metrics.h"
 #include "server/process/task_pool.h"
 #include "server/registry/catalog/body.h"
@@ -88,17 +88,16 @@ class PairQuery : public std::enable_shared_from_this<PairQuery> {
                            MakeQueryOptions(request.method(), request.wanted(), request.tolerance(),
                                             parts_.registry.limits(), call.lifetime()));
     if (!request.has_a() || !request.has_b()) {
-      return absl::InvalidArgumentError(
-          absl::StrCat(request.has_a() ? "b" : "a", " is missing; give a hull ID or points"));
+      return InvalidArgument(request.has_a() ? "b" : "a", " is missing; give a hull ID or points");
     }
     HULLD_ASSIGN_OR_RETURN(table_,
                            PlacementTable::MakePair(request.a(), request.b(), call.caller()));
     const bool is_of_a = request.a().radius() > 0;
     const double radius = is_of_a ? request.a().radius() : request.b().radius();
     if (options_.method == Method::kTextbookSat && radius > 0) {
-      return absl::InvalidArgumentError(absl::StrCat(
+      return InvalidArgument(
           is_of_a ? "a" : "b", ".radius is ", radius,
-          ", but METHOD_TEXTBOOK_SAT applies to hulls without a radius; omit one of them"));
+          ", but METHOD_TEXTBOOK_SAT applies to hulls without a radius; omit one of them");
     }
     if (table_.has_motions()) {
       HULLD_RETURN_IF_ERROR(ValidateForMotions(options_));
@@ -149,7 +148,7 @@ class PairQuery : public std::enable_shared_from_this<PairQuery> {
       if (!table_.is_answerable(i)) return table_.problem(i);
     }
     v1::CheckCollisionResponse& response = call_->response();
-    table_.EncodeHeader(parts_.store, response.mutable_header());
+    EncodeHeader(parts_.store, table_.as_of(), response.mutable_header());
     table_.EncodeHull(*table_.hull_of(kA), response.mutable_hull_a());
     table_.EncodeHull(*table_.hull_of(kB), response.mutable_hull_b());
     search_.emplace(table_, kA, kB, options_, motion_options_);

@@ -17,7 +17,7 @@
 
 #include "core/base/check.h"
 #include "core/base/status_macros.h"
-#include "server/call/queued_stream.h"
+#include "server/call/call_stream.h"
 #include "server/call/service_parts.h"
 #include "server/collisions/placed/placement_table.h"
 #include "server/collisions/placed/query_settings.h"
@@ -313,7 +313,7 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   // of the table follows.
   bool QueueHead() {
     Reply head;
-    if (next_row_ == 0) table_.EncodeHeader(parts_.store, head.mutable_header());
+    if (next_row_ == 0) EncodeHeader(parts_.store, table_.as_of(), head.mutable_header());
     next_row_ = table_.EncodeHulls(next_row_, &head);
     const size_t bytes = head.ByteSizeLong();
     this->Queue(std::move(head), bytes);

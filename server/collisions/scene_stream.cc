@@ -21,8 +21,8 @@
 #include "server/collisions/placed/placed_answer.h"
 #include "server/collisions/placed/placement_table.h"
 #include "server/collisions/placed/query_settings.h"
-#include "server/collisions/placed/scene_groups.h"
 #include "server/collisions/ranked_pairs.h"
+#include "server/contract/errors.h"
 #include "server/process/task_pool.h"
 #include "server/registry/registry.h"
 #include "server/wire/answer_columns.h"
@@ -236,7 +236,7 @@ class SceneStream
          "wanted.clearance, which may be infinite"},
     };
     for (const auto& [is_wrong, message] : errors) {
-      if (is_wrong) return absl::InvalidArgumentError(message);
+      if (is_wrong) return InvalidArgument(message);
     }
     return absl::OkStatus();
   }

@@ -66,9 +66,8 @@ absl::Status WithReason(absl::Status status, v1::ErrorReason reason,
 }
 
 absl::Status Draining() {
-  return WithReason(
-      absl::UnavailableError("hulld is shutting down; retry later or on another server"),
-      v1::ERROR_REASON_DRAINING);
+  return WithReason(Unavailable("hulld is shutting down; retry later or on another server"),
+                    v1::ERROR_REASON_DRAINING);
 }
 
 v1::ErrorReason ReasonOf(const absl::Status& status) {

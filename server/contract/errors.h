@@ -2,6 +2,7 @@
 #define HULLD_SERVER_CONTRACT_ERRORS_H_
 
 #include <absl/status/status.h>
+#include <absl/strings/str_cat.h>
 #include <grpcpp/support/status.h>
 
 #include <chrono>
@@ -24,6 +25,16 @@ grpc::Status ToGrpc(const absl::Status& status);
 // same numbers.
 inline grpc::StatusCode ToGrpc(absl::StatusCode code) {
   return static_cast<grpc::StatusCode>(code);
+}
+
+// Return an error whose message is the concatenation of `parts`, as by absl::StrCat.
+template <typename... Parts>
+absl::Status InvalidArgument(const Parts&... parts) {
+  return absl::InvalidArgumentError(absl::StrCat(parts...));
+}
+template <typename... Parts>
+absl::Status Unavailable(const Parts&... parts) {
+  return absl::UnavailableError(absl::StrCat(parts...));
 }
 
 // Returns the status with `prefix` before its message, keeping its payloads; OK stays OK.

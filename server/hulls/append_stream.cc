@@ -1,6 +1,5 @@
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
-#include <absl/strings/str_cat.h>
 #include <grpcpp/grpcpp.h>
 
 #include <algorithm>
@@ -12,8 +11,9 @@
 #include "core/base/check.h"
 #include "core/base/status_macros.h"
 #include "hulld/v1/hull.pb.h"
-#include "server/call/queued_stream.h"
+#include "server/call/call_stream.h"
 #include "server/call/service_parts.h"
+#include "server/contract/errors.h"
 #include "server/hulls/hull_service.h"
 #include "server/hulls/in_order.h"
 #include "server/process/random_id.h"
@@ -25,8 +25,8 @@ namespace {
 
 absl::Status ValidateWriterId(const std::string& writer_id) {
   if (writer_id.size() <= Config::kMaxIdCharacters) return absl::OkStatus();
-  return absl::InvalidArgumentError(absl::StrCat(
-      "open.writer_id has ", writer_id.size(), " bytes; the limit is ", Config::kMaxIdCharacters));
+  return InvalidArgument("open.writer_id has ", writer_id.size(), " bytes; the limit is ",
+                         Config::kMaxIdCharacters);
 }
 
 // One chunk is being built and one is being decoded.
@@ -75,7 +75,7 @@ class AppendStream : public ReadingStream<QueuedStream<BidiReactor, v1::AppendPo
   bool IsWorking() const override { return opening_ || unbuilt_ > 0 || uncommitted_ > 0; }
   void OnMessage() override {
     if (end().has_value()) return;
-    absl::Status status = absl::InvalidArgumentError("the message is empty; set open or chunk");
+    absl::Status status = InvalidArgument("the message is empty; set open or chunk");
     if (request().has_open()) status = HandleOpen(request().open());
     if (request().has_chunk()) status = HandleChunk(request().chunk());
     if (!status.ok()) Fail(status);
@@ -85,7 +85,7 @@ class AppendStream : public ReadingStream<QueuedStream<BidiReactor, v1::AppendPo
 
   absl::Status HandleOpen(const v1::AppendOpen& open) {
     if (session_.has_value()) {
-      return absl::InvalidArgumentError(
+      return InvalidArgument(
           "open was sent twice; a stream appends to one hull; start a new stream");
     }
     HULLD_RETURN_IF_ERROR(CheckHullId(call().caller(), open.hull_id(), "open.hull_id"));
@@ -113,7 +113,7 @@ class AppendStream : public ReadingStream<QueuedStream<BidiReactor, v1::AppendPo
 
   absl::Status HandleChunk(const v1::AppendChunk& message) {
     if (!session_.has_value()) {
-      return absl::InvalidArgumentError("the first message must be open, not a chunk");
+      return InvalidArgument("the first message must be open, not a chunk");
     }
     HULLD_ASSIGN_OR_RETURN(Chunk chunk,
                            DecodeChunk(message, parts_.registry.limits().max_points_per_chunk));

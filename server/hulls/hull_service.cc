@@ -10,7 +10,7 @@
 #include "server/call/unary_call.h"
 #include "server/wire/decode.h"
 #include "server/wire/encode.h"
-#include "server/wire/fresh_answer.h"
+#include "server/wire/unary_answers.h"
 
 namespace hulld::server {
 namespace {

@@ -17,7 +17,12 @@ namespace hulld::server {
 // must outlive the service.
 std::unique_ptr<grpc::Service> MakeHullService(const ServiceParts& parts);
 
-// The streaming calls of the service. Each function starts a call and returns its reactor, which
+// hulld.v1.BodyService: implements the contract in body.proto on the registry. Calls that only read
+// records are answered on arrival. Calls that involve pieces, possibly many, run on `readers`. The
+// parts must outlive the service.
+std::unique_ptr<grpc::Service> MakeBodyService(const ServiceParts& parts);
+
+// The streaming calls of HullService. Each function starts a call and returns its reactor, which
 // owns itself until gRPC releases it. request, response: owned by gRPC until the call ends.
 BidiReactor* StartAppend(CallContext& context, const ServiceParts& parts);
 ReadReactor* StartReplace(CallContext& context, const ServiceParts& parts, Bytes* response);

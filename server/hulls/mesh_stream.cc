@@ -9,7 +9,7 @@
 #include "core/base/status_macros.h"
 #include "core/hull/simplification/simplify.h"
 #include "hulld/v1/hull.pb.h"
-#include "server/call/pulled_stream.h"
+#include "server/call/call_stream.h"
 #include "server/call/service_parts.h"
 #include "server/contract/errors.h"
 #include "server/hulls/hull_service.h"
@@ -73,7 +73,7 @@ class MeshStream : public RequestStream<PulledStream<WriteReactor, v1::GetHullMe
                                    simplification.max_error(), call().should_stop()};
     const bool is_inside = simplification.side() == v1::SIMPLIFICATION_SIDE_INSIDE;
     if (!is_inside && simplification.side() != v1::SIMPLIFICATION_SIDE_OUTSIDE) {
-      return absl::InvalidArgumentError("side must be INSIDE or OUTSIDE");
+      return InvalidArgument("side must be INSIDE or OUTSIDE");
     }
     HULLD_ASSIGN_OR_RETURN(SimplifiedHull simplified, is_inside ? SimplifyInside(*mesh_, target)
                                                                 : SimplifyOutside(*mesh_, target));

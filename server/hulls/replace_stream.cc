@@ -52,10 +52,9 @@ class ReplaceStream : public ReadingStream<CallStream<ReadReactor>, v1::ReplaceH
     const bool opened = replacement_.builder != nullptr;
     // Only the empty block distinguishes a complete request from a client that disconnected.
     if (opened && complete_) return RunOn(parts_.writers, [this] { Commit(); });
-    FinishCall(
-        absl::InvalidArgumentError(opened ? "the stream ended without the empty block of points "
-                                            "that marks its end; the hull is unchanged"
-                                          : "the stream ended before its first message, open"));
+    FinishCall(InvalidArgument(opened ? "the stream ended without the empty block of points "
+                                        "that marks its end; the hull is unchanged"
+                                      : "the stream ended before its first message, open"));
   }
 
   // Handles a message, except for building.
@@ -63,12 +62,12 @@ class ReplaceStream : public ReadingStream<CallStream<ReadReactor>, v1::ReplaceH
     const bool opened = replacement_.builder != nullptr;
     if (request().has_open()) {
       if (!opened) return HandleOpen(request().open());
-      return absl::InvalidArgumentError("open was sent twice; start a new stream");
+      return InvalidArgument("open was sent twice; start a new stream");
     }
     if (!request().has_points()) {
-      return absl::InvalidArgumentError("the message is empty; set open or points");
+      return InvalidArgument("the message is empty; set open or points");
     }
-    if (!opened) return absl::InvalidArgumentError("the first message must be open, not points");
+    if (!opened) return InvalidArgument("the first message must be open, not points");
     complete_ = request().points().xyz().empty() && request().points().xyz_float().empty();
     return absl::OkStatus();
   }

@@ -11,8 +11,9 @@
 
 #include "core/base/status_macros.h"
 #include "hulld/v1/hull.pb.h"
-#include "server/call/pulled_stream.h"
+#include "server/call/call_stream.h"
 #include "server/call/service_parts.h"
+#include "server/contract/errors.h"
 #include "server/hulls/hull_service.h"
 #include "server/registry/watch/change_feed.h"
 #include "server/wire/encode.h"
@@ -92,8 +93,7 @@ class WatchStream : public RequestStream<PulledStream<WriteReactor, v1::WatchHul
   absl::Status Begin() {
     HULLD_ASSIGN_OR_RETURN(const WatchTarget target, ReadTarget());
     if (request().after_revision() > 0 && request().store_id().empty()) {
-      return absl::InvalidArgumentError(
-          "after_revision requires store_id; use the one from the same header");
+      return InvalidArgument("after_revision requires store_id; use the one from the same header");
     }
     HULLD_RETURN_IF_ERROR(parts_.registry.peers().AwaitPeers(call().should_stop()));
     HULLD_ASSIGN_OR_RETURN(watch_, parts_.registry.feed().Open(
@@ -108,7 +108,7 @@ class WatchStream : public RequestStream<PulledStream<WriteReactor, v1::WatchHul
       return WatchTarget{std::move(prefix), {}, request().bodies()};
     }
     if (!request().prefix().empty()) {
-      return absl::InvalidArgumentError("prefix and hull_id are both set; set one of them");
+      return InvalidArgument("prefix and hull_id are both set; set one of them");
     }
     HULLD_RETURN_IF_ERROR(CheckHullId(call().caller(), request().hull_id(), "hull_id"));
     return WatchTarget{"", {request().hull_id()}, request().bodies()};

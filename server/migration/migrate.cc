@@ -113,8 +113,7 @@ absl::Status CompareReopened(const Place& to, const Migration& migration,
 
 absl::Status Run(const Place& from, const Place& to, std::ostream& out, std::ostream& err) {
   if (from == to) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("source and destination are both ", from.Describe()));
+    return InvalidArgument("source and destination are both ", from.Describe());
   }
   const absl::StatusOr<std::unique_ptr<Store>> source = OpenSource(from);
   if (!source.ok()) return Explain(from, source.status());

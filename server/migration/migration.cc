@@ -61,13 +61,12 @@ Migration::Migration(Store& source, Progress progress)
 absl::StatusOr<Migration> Migration::Read(Store& source, Progress progress) {
   Migration migration(source, std::move(progress));
   absl::Status damage;
-  HULLD_RETURN_IF_ERROR(
-      source.ForEachHull([&](const std::string&, absl::StatusOr<StoredHull> hull) {
+  HULLD_RETURN_IF_ERROR(source.ForEachRecord(
+      [&](const std::string&, absl::StatusOr<StoredHull> hull) {
         if (!hull.ok()) return damage.Update(hull.status());
         migration.hulls_.push_back(*std::move(hull));
-      }));
-  HULLD_RETURN_IF_ERROR(
-      source.ForEachBody([&](const std::string&, absl::StatusOr<StoredBody> body) {
+      },
+      [&](const std::string&, absl::StatusOr<StoredBody> body) {
         if (!body.ok()) return damage.Update(body.status());
         migration.bodies_.push_back(*std::move(body));
       }));
@@ -89,8 +88,7 @@ absl::Status Migration::Prepare(MigrationTarget& target) {
   }
   uint64_t held = 0;
   const auto count = [&held](const auto&...) { ++held; };
-  HULLD_RETURN_IF_ERROR(target.store().ForEachHull(count));
-  HULLD_RETURN_IF_ERROR(target.store().ForEachBody(count));
+  HULLD_RETURN_IF_ERROR(target.store().ForEachRecord(count, count));
   if (held == 0 && target.store().revision() == 0) return target.Begin(as_of_);
   return absl::FailedPreconditionError(absl::StrCat(
       "the destination is not empty: it is store ", target.store().id(), " at revision ",
@@ -103,9 +101,8 @@ absl::StatusOr<MigrationCounts> Migration::CopyTo(MigrationTarget& target) {
   std::string last_hull;
   std::string last_body;
   HULLD_RETURN_IF_ERROR(
-      target.store().ForEachHull([&](const std::string& id, const auto&) { last_hull = id; }));
-  HULLD_RETURN_IF_ERROR(
-      target.store().ForEachBody([&](const std::string& id, const auto&) { last_body = id; }));
+      target.store().ForEachRecord([&](const std::string& id, const auto&) { last_hull = id; },
+                                   [&](const std::string& id, const auto&) { last_body = id; }));
   MigrationCounts counts;
   std::vector<Change> pending;
   size_t vertices = 0;

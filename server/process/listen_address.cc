@@ -10,6 +10,7 @@
 #include <cerrno>
 #include <cstring>
 
+#include "server/contract/errors.h"
 #include "server/process/descriptors.h"
 
 namespace hulld::server {
@@ -22,8 +23,8 @@ bool IsPort(const std::string& text) {
 }
 
 absl::Status Malformed(const char* flag, const std::string& text, const char* why) {
-  return absl::InvalidArgumentError(absl::StrCat(flag, " is \"", text, "\": ", why,
-                                                 "; expected host:port, [v6]:port, or unix:path"));
+  return InvalidArgument(flag, " is \"", text, "\": ", why,
+                         "; expected host:port, [v6]:port, or unix:path");
 }
 
 }  // namespace
@@ -69,11 +70,11 @@ absl::StatusOr<ListenAddress> ParseListenAddress(const std::string& text, const 
 
 absl::Status CheckExposure(const ListenAddress& address, bool has_tls, bool insecure) {
   if (has_tls || insecure || address.is_local()) return absl::OkStatus();
-  return absl::InvalidArgumentError(absl::StrCat(
+  return InvalidArgument(
       "--listen ", address.host, ":", address.port,
       " is reachable from other machines, and traffic, including tokens, would not be encrypted; "
       "encrypt it with --tls-cert and --tls-key, listen on 127.0.0.1, [::1] or "
-      "unix:path, or allow it with --insecure"));
+      "unix:path, or allow it with --insecure");
 }
 
 absl::Status CheckSocketFree(const ListenAddress& address) {
@@ -85,9 +86,8 @@ absl::Status CheckSocketFree(const ListenAddress& address) {
   if (connect(socket.number(), reinterpret_cast<const sockaddr*>(&name), sizeof name) != 0) {
     return absl::OkStatus();
   }
-  return absl::UnavailableError(
-      absl::StrCat("cannot listen on unix:", address.path,
-                   ": another server is listening; stop it or choose another path with --listen"));
+  return Unavailable("cannot listen on unix:", address.path,
+                     ": another server is listening; stop it or choose another path with --listen");
 }
 
 absl::Status BindFailure(const ListenAddress& address, int error, const std::string& cause,
@@ -96,17 +96,16 @@ absl::Status BindFailure(const ListenAddress& address, int error, const std::str
       "cannot listen on ",
       address.is_unix() ? "unix:" + address.path : address.host + ":" + address.port, ": ");
   if (address.is_unix()) {
-    return absl::UnavailableError(
-        absl::StrCat(what, "check that the socket's directory exists and is writable"));
+    return Unavailable(what, "check that the socket's directory exists and is writable");
   }
   if (error == EADDRINUSE) {
-    return absl::UnavailableError(
-        absl::StrCat(what, "the port is in use; stop the other server or choose another port with ",
-                     flag, " (port 0 picks a free one)"));
+    return Unavailable(what,
+                       "the port is in use; stop the other server or choose another port with ",
+                       flag, " (port 0 picks a free one)");
   }
   const char* const advice =
       error == EACCES ? "choose a port above 1023 with " : "use an address of this machine with ";
-  return absl::UnavailableError(absl::StrCat(what, cause, "; ", advice, flag));
+  return Unavailable(what, cause, "; ", advice, flag);
 }
 
 }  // namespace hulld::server

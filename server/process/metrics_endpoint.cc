@@ -21,6 +21,7 @@
 #include <utility>
 
 #include "core/base/status_macros.h"
+#include "server/contract/errors.h"
 #include "server/process/listen_address.h"
 
 namespace hulld::server {
@@ -163,14 +164,13 @@ class Listener : public MetricsEndpoint {
 absl::StatusOr<ListenAddress> ParseMetricsAddress(const std::string& address, bool exposed) {
   HULLD_ASSIGN_OR_RETURN(ListenAddress parsed, ParseListenAddress(address, kFlag));
   if (parsed.is_unix()) {
-    return absl::InvalidArgumentError(
-        absl::StrCat(kFlag, " is \"", address, "\": it must be a TCP address, host:port"));
+    return InvalidArgument(kFlag, " is \"", address, "\": it must be a TCP address, host:port");
   }
   if (!parsed.is_local() && !exposed) {
-    return absl::InvalidArgumentError(absl::StrCat(
+    return InvalidArgument(
         kFlag, " is \"", address,
         "\", which is reachable from other machines, and metrics are neither ",
-        "encrypted nor authenticated; use 127.0.0.1, or allow it with --metrics-insecure"));
+        "encrypted nor authenticated; use 127.0.0.1, or allow it with --metrics-insecure");
   }
   return parsed;
 }

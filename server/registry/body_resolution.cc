@@ -32,11 +32,11 @@ absl::Status WhyNoPiece(const Body& body, size_t hull, const absl::Status& cause
   const std::string& body_id = body.record().body_id;
   const std::string& hull_id = body.hull_ids()[hull];
   if (!absl::IsNotFound(cause)) {
-    return Prefixed(absl::StrCat(QuotedBody(body_id), ": piece ", piece, ": "), cause);
+    return Prefixed(absl::StrCat(Quoted("body", body_id), ": piece ", piece, ": "), cause);
   }
-  return WithReason(absl::NotFoundError(
-                        absl::StrCat(QuotedBody(body_id), ": piece ", piece, ": ", cause.message(),
-                                     "; create it, or remove that piece from the body")),
+  return WithReason(absl::NotFoundError(absl::StrCat(
+                        Quoted("body", body_id), ": piece ", piece, ": ", cause.message(),
+                        "; create it, or remove that piece from the body")),
                     v1::ERROR_REASON_PIECE_NOT_FOUND,
                     {{"body_id", body_id}, {"piece", uint64_t{piece}}, {"hull_id", hull_id}});
 }
@@ -206,7 +206,7 @@ absl::Status CheckPiecePrefix(const Body& body, const std::string& prefix) {
     if (body.hull_ids()[hull].starts_with(prefix)) continue;
     return WithReason(
         absl::PermissionDeniedError(absl::StrCat(
-            QuotedBody(body.record().body_id), ": the hull of piece ", PieceWith(body, hull),
+            Quoted("body", body.record().body_id), ": the hull of piece ", PieceWith(body, hull),
             " is outside the token's prefix \"", prefix, "\"; use another token")),
         v1::ERROR_REASON_OUTSIDE_PREFIX, {{"prefix", prefix}});
   }

@@ -13,7 +13,6 @@
 
 #include "core/numeric/vector.h"
 #include "server/registry/catalog/body.h"
-#include "server/registry/catalog/known_hulls.h"
 #include "server/registry/registry.h"
 
 namespace hulld::server {

@@ -44,20 +44,20 @@ absl::Status Registry::Load() {
   if (state_.is_cache()) {
     totals = store.totals();
   } else {
-    HULLD_RETURN_IF_ERROR(
-        store.ForEachHull([&](const std::string& id, const absl::StatusOr<StoredHull>& stored) {
+    HULLD_RETURN_IF_ERROR(store.ForEachRecord(
+        [&](const std::string& id, const absl::StatusOr<StoredHull>& stored) {
           state_.AddStored(id, stored);
           if (stored.ok()) totals.vertices += stored->record.vertex_count;
-        }));
-    if (state_.statistics.damaged > 0) {
-      spdlog::error("{} of {} hulls are damaged", state_.statistics.damaged, state_.hulls.size());
-    }
-    HULLD_RETURN_IF_ERROR(
-        store.ForEachBody([&](const std::string& id, const absl::StatusOr<StoredBody>& body) {
+        },
+        [&](const std::string& id, const absl::StatusOr<StoredBody>& body) {
           state_.AddBody(locked, id, body);
         }));
     totals.hulls = state_.hulls.size();
     totals.bodies = state_.bodies.size();
+    if (state_.statistics.damaged > 0) {
+      spdlog::error("{} of {} hulls and bodies are damaged", state_.statistics.damaged,
+                    totals.hulls + totals.bodies);
+    }
   }
   state_.SetTotals(totals);
   return peers_.Begin(locked, [this](const std::string& id, const HullPointer& hull) {

@@ -12,7 +12,6 @@
 
 #include "server/process/metrics.h"
 #include "server/process/task_pool.h"
-#include "server/registry/catalog/known_hulls.h"
 #include "server/registry/catalog/registry_types.h"
 #include "server/registry/changes/local_changes.h"
 #include "server/registry/commit/committer.h"

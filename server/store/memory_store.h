@@ -19,8 +19,9 @@ class MemoryStore : public Store {
   Durability durability() const override { return Durability::kMemory; }
   bool keeps_hulls() const override { return false; }
   uint64_t revision() const override { return revision_; }
-  absl::Status ForEachHull(const StoredHullVisitor&) override { return absl::OkStatus(); }
-  absl::Status ForEachBody(const StoredBodyVisitor&) override { return absl::OkStatus(); }
+  absl::Status ForEachRecord(const StoredHullVisitor&, const StoredBodyVisitor&) override {
+    return absl::OkStatus();
+  }
   absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull&) override {
     return absl::NotFoundError("an in-memory store has no stored records");
   }

@@ -55,7 +55,7 @@ void ClearScratch(const std::string& data_dir) {
 
 absl::StatusOr<std::unique_ptr<RocksDbStore>> RocksDbStore::Open(RocksDbOptions options) {
   if (options.data_dir.empty()) {
-    return absl::InvalidArgumentError("--data-dir is empty; name the directory of the store");
+    return InvalidArgument("--data-dir is empty; name the directory of the store");
   }
   std::unique_ptr<RocksDbStore> store(new RocksDbStore(std::move(options)));
   const bool read_only = store->options_.read_only;
@@ -134,8 +134,8 @@ absl::Status RocksDbStore::MakeDirectories() {
   // Created at startup after the directories are durable.
   if (env_->FileExists((database / "CURRENT").string()).ok()) return absl::OkStatus();
   const auto failure = [this](const fs::path& path, const rocksdb::Status& status) {
-    return absl::UnavailableError(absl::StrCat("cannot create --data-dir ", options_.data_dir, ": ",
-                                               path.string(), ": ", status.ToString()));
+    return Unavailable("cannot create --data-dir ", options_.data_dir, ": ", path.string(), ": ",
+                       status.ToString());
   };
   std::vector<fs::path> missing;
   fs::path above = database;
@@ -331,7 +331,7 @@ absl::Status RocksDbStore::BeginRun() {
   relaxed_run_ = relaxed;
   if (restored &&
       (!std::filesystem::remove(mark, error) || !SyncDirectory(*files_, options_.data_dir).ok())) {
-    return absl::UnavailableError(absl::StrCat("cannot remove ", mark));
+    return Unavailable("cannot remove ", mark);
   }
   if (restored) {
     spdlog::info("restored from a backup of store {} at revision {}; the new store ID is {}",

@@ -76,22 +76,20 @@ absl::Status RocksDbStore::ScanRange(
   return absl::OkStatus();
 }
 
-absl::Status RocksDbStore::ForEachHull(const StoredHullVisitor& visit) {
-  return ScanRange(std::string(1, kHullPrefix), std::string(1, kHullPrefix + 1),
-                   [&](std::string_view key, std::string_view sealed) {
-                     const std::string hull_id(key.substr(1));
-                     visit(hull_id, UnsealStoredHull(hull_id, sealed));
-                     return absl::OkStatus();
-                   });
-}
-
-absl::Status RocksDbStore::ForEachBody(const StoredBodyVisitor& visit) {
-  return ScanRange(std::string(1, kBodyPrefix), std::string(1, kBodyPrefix + 1),
-                   [&](std::string_view key, std::string_view sealed) {
-                     const std::string body_id(key.substr(1));
-                     visit(body_id, UnsealStoredBody(body_id, sealed));
-                     return absl::OkStatus();
-                   });
+absl::Status RocksDbStore::ForEachRecord(const StoredHullVisitor& visit_hull,
+                                         const StoredBodyVisitor& visit_body) {
+  // After an error in the hulls, doctor still needs the bodies.
+  absl::Status read;
+  for (const char prefix : {kHullPrefix, kBodyPrefix}) {
+    read.Update(ScanRange(std::string(1, prefix), std::string(1, static_cast<char>(prefix + 1)),
+                          [&](std::string_view key, std::string_view sealed) {
+                            const std::string id(key.substr(1));
+                            prefix == kHullPrefix ? visit_hull(id, UnsealStoredHull(id, sealed))
+                                                  : visit_body(id, UnsealStoredBody(id, sealed));
+                            return absl::OkStatus();
+                          }));
+  }
+  return read;
 }
 
 absl::StatusOr<std::vector<Vector>> RocksDbStore::LoadVertices(const StoredHull& hull) {

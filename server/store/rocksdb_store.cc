@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "core/base/status_macros.h"
+#include "server/contract/errors.h"
 #include "server/process/random_id.h"
 #include "server/store/store_errors.h"
 #include "server/store/store_keys.h"
@@ -112,7 +113,7 @@ absl::Status RocksDbStore::ReadFailed(const rocksdb::Status& status) {
   const std::string text = absl::StrCat("cannot read: ", status.ToString());
   if (status.IsCorruption()) return absl::DataLossError(text);
   ++read_failures_;
-  return absl::UnavailableError(text);
+  return Unavailable(text);
 }
 
 // Deletes values of incarnations that have no hull, if kLostKey is set: deleting a hull with a
@@ -126,11 +127,12 @@ absl::Status RocksDbStore::DropLostIncarnations() {
   if (lost.ok() && !lost->has_value()) return absl::OkStatus();
   std::unordered_set<uint64_t> known;
   bool certain = true;
-  absl::Status read = ForEachHull([&](const std::string&, const absl::StatusOr<StoredHull>& hull) {
-    certain = certain && hull.ok();
-    if (hull.ok()) known.insert(hull->record.create_revision);
-  });
-  if (!read.ok()) return read;
+  HULLD_RETURN_IF_ERROR(ForEachRecord(
+      [&](const std::string&, const absl::StatusOr<StoredHull>& hull) {
+        certain = certain && hull.ok();
+        if (hull.ok()) known.insert(hull->record.create_revision);
+      },
+      [](const auto&...) {}));
   if (!certain) return absl::OkStatus();
   rocksdb::WriteBatch batch;
   for (const char prefix : {kWriterPrefix, kBasePrefix, kDeltaPrefix}) {
@@ -215,8 +217,7 @@ absl::StatusOr<std::string> RocksDbStore::MakeCopy() {
   std::error_code error;
   std::filesystem::create_directories(directory, error);
   if (error) {
-    return absl::UnavailableError(
-        absl::StrCat("cannot create ", directory, " for the copy: ", error.message()));
+    return Unavailable("cannot create ", directory, " for the copy: ", error.message());
   }
   rocksdb::Checkpoint* created = nullptr;
   rocksdb::Status status = rocksdb::Checkpoint::Create(db_.get(), &created);

@@ -98,8 +98,8 @@ class RocksDbStore : public Store {
   Durability durability() const override { return options_.durability; }
   bool keeps_hulls() const override { return true; }
   uint64_t revision() const override { return revision_; }
-  absl::Status ForEachHull(const StoredHullVisitor& visit) override;
-  absl::Status ForEachBody(const StoredBodyVisitor& visit) override;
+  absl::Status ForEachRecord(const StoredHullVisitor& visit_hull,
+                             const StoredBodyVisitor& visit_body) override;
   absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull& hull) override;
   // Reads the first values of all hulls together, so that a block with several values is one read.
   std::vector<absl::StatusOr<std::vector<Vector>>> LoadVerticesOfEach(

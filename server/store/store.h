@@ -205,10 +205,10 @@ class Store {
   // The last committed revision. Not concurrent with Commit.
   virtual uint64_t revision() const = 0;
 
-  // Visits every hull in byte order of the IDs.
-  virtual absl::Status ForEachHull(const StoredHullVisitor& visit) = 0;
-  // Visits every body in the same order.
-  virtual absl::Status ForEachBody(const StoredBodyVisitor& visit) = 0;
+  // Visits every hull, then every body, each in byte order of the IDs. By default, lists all
+  // records page by page.
+  virtual absl::Status ForEachRecord(const StoredHullVisitor& visit_hull,
+                                     const StoredBodyVisitor& visit_body);
   // Returns points with the convex hull `hull`. DATA_LOSS naming the hull: values are missing or
   // damaged.
   virtual absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull& hull) = 0;

@@ -34,24 +34,23 @@ bool IsDiskFull(const absl::Status& status) { return absl::IsResourceExhausted(s
 absl::Status WriteError(const rocksdb::Status& status, const std::string& data_dir) {
   const std::string cause = status.ToString();
   if (ReportsFullDisk(status)) return DiskFull(cause, data_dir);
-  return absl::UnavailableError(
-      absl::StrCat("cannot write to --data-dir ", data_dir, " (", cause,
-                   "); nothing was changed; fix the cause, then retry; no restart is needed"));
+  return Unavailable("cannot write to --data-dir ", data_dir, " (", cause,
+                     "); nothing was changed; fix the cause, then retry; no restart is needed");
 }
 
 absl::Status OutcomeUnknown(const rocksdb::Status& status, const rocksdb::Status& cut,
                             const std::string& data_dir) {
-  return absl::UnavailableError(
-      absl::StrCat("cannot write to --data-dir ", data_dir, " (", status.ToString(),
-                   "), nor roll back the partial write (", cut.ToString(),
-                   "): the change is not visible, but may appear if the server restarts before the "
-                   "disk is fixed; check whether it is there before you retry"));
+  return Unavailable(
+      "cannot write to --data-dir ", data_dir, " (", status.ToString(),
+      "), nor roll back the partial write (", cut.ToString(),
+      "): the change is not visible, but may appear if the server restarts before the "
+      "disk is fixed; check whether it is there before you retry");
 }
 
 absl::Status CannotBeRead(const std::string& data_dir) {
-  return absl::UnavailableError(absl::StrCat(
+  return Unavailable(
       "the store in --data-dir ", data_dir,
-      " became unreadable after an error; restart hulld, and run 'hulld doctor' if that fails"));
+      " became unreadable after an error; restart hulld, and run 'hulld doctor' if that fails");
 }
 
 absl::Status OpenError(const rocksdb::Status& status, const std::string& data_dir, bool read_only) {
@@ -71,8 +70,7 @@ absl::Status OpenError(const rocksdb::Status& status, const std::string& data_di
         absl::StrCat("--data-dir ", data_dir, " contains no hulld store (", cause, ")"));
   }
   if (ReportsFullDisk(status)) return DiskFull(cause, data_dir);
-  return absl::UnavailableError(
-      absl::StrCat("cannot open the store in --data-dir ", data_dir, ": ", cause));
+  return Unavailable("cannot open the store in --data-dir ", data_dir, ": ", cause);
 }
 
 absl::Status LogLost(const std::string& data_dir, const std::string& finding,

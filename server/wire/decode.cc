@@ -23,8 +23,7 @@ absl::StatusOr<std::vector<Vector>> DecodePoints(const Coordinates& coordinates,
                                                  uint64_t max_points) {
   static_assert(sizeof(Vector) == 3 * sizeof(double));
   if (coordinates.size() % 3 != 0) {
-    return absl::InvalidArgumentError(
-        absl::StrCat(field, " has ", coordinates.size(), " numbers; each point needs three"));
+    return InvalidArgument(field, " has ", coordinates.size(), " numbers; each point needs three");
   }
   const auto count = static_cast<size_t>(coordinates.size()) / 3;
   if (count > max_points) {
@@ -50,9 +49,8 @@ absl::StatusOr<std::chrono::nanoseconds> DecodeStaleness(
   // Far longer than any server runs, yet far below an overflow.
   constexpr int64_t kMaxSeconds = kNanosPerSecond;
   if (message.seconds() < 0 || message.nanos() < 0 || message.nanos() >= kNanosPerSecond) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("freshness.max_staleness is ", message.seconds(), " s and ", message.nanos(),
-                     " ns; it must be at least 0, with nanos below 10^9"));
+    return InvalidArgument("freshness.max_staleness is ", message.seconds(), " s and ",
+                           message.nanos(), " ns; it must be at least 0, with nanos below 10^9");
   }
   if (message.seconds() >= kMaxSeconds) return std::chrono::seconds(kMaxSeconds);
   return std::chrono::seconds(message.seconds()) + std::chrono::nanoseconds(message.nanos());
@@ -62,7 +60,7 @@ absl::StatusOr<std::chrono::nanoseconds> DecodeStaleness(
 
 absl::StatusOr<std::vector<Vector>> DecodePoints(const v1::PointBlock& block, uint64_t max_points) {
   if (!block.xyz().empty() && !block.xyz_float().empty()) {
-    return absl::InvalidArgumentError("points has both xyz and xyz_float; set one of them");
+    return InvalidArgument("points has both xyz and xyz_float; set one of them");
   }
   if (!block.xyz_float().empty()) {
     return DecodePoints(block.xyz_float(), "points.xyz_float", max_points);
@@ -72,21 +70,19 @@ absl::StatusOr<std::vector<Vector>> DecodePoints(const v1::PointBlock& block, ui
 
 absl::Status CheckShape(std::span<const Vector> points) {
   if (points.empty()) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("points is empty; give 1 to ", Config::kMaxShapePoints));
+    return InvalidArgument("points is empty; give 1 to ", Config::kMaxShapePoints);
   }
   if (points.size() > Config::kMaxShapePoints) {
-    return absl::InvalidArgumentError(absl::StrCat(
-        "points has ", points.size(), " points; the limit of an inline shape is ",
-        Config::kMaxShapePoints, "; give only the vertices of the hull, or register it"));
+    return InvalidArgument("points has ", points.size(),
+                           " points; the limit of an inline shape is ", Config::kMaxShapePoints,
+                           "; give only the vertices of the hull, or register it");
   }
   for (size_t i = 0; i < points.size(); ++i) {
     if (points[i].allFinite()) continue;
     const auto is_finite = [](double x) { return std::isfinite(x); };
     const auto k = std::ranges::find_if_not(points[i], is_finite) - points[i].begin();
-    return absl::InvalidArgumentError(absl::StrCat("points[", i, "].", std::string(1, "xyz"[k]),
-                                                   " is ",
-                                                   std::isnan(points[i][k]) ? "NaN" : "infinite"));
+    return InvalidArgument("points[", i, "].", std::string(1, "xyz"[k]), " is ",
+                           std::isnan(points[i][k]) ? "NaN" : "infinite");
   }
   return absl::OkStatus();
 }
@@ -101,7 +97,7 @@ absl::Status DecodeShape(const v1::PointBlock& block, InlineShapes* shapes) {
 
 absl::StatusOr<Chunk> DecodeChunk(const v1::AppendChunk& message, uint64_t max_points) {
   if (message.sequence() == 0) {
-    return absl::InvalidArgumentError("chunk 0: sequence is 0 or missing; sequences start at 1");
+    return InvalidArgument("chunk 0: sequence is 0 or missing; sequences start at 1");
   }
   absl::StatusOr<std::vector<Vector>> points = DecodePoints(message.points(), max_points);
   if (!points.ok()) {
@@ -129,17 +125,17 @@ Pose ReadPose(const v1::Pose& message) {
 
 absl::Status ValidateRadius(double radius) {
   if (IsValidRadius(radius)) return absl::OkStatus();
-  return absl::InvalidArgumentError(absl::StrCat(" is ",
-                                                 std::isnan(radius)   ? "NaN"
-                                                 : std::isinf(radius) ? "infinite"
-                                                                      : absl::StrCat(radius),
-                                                 "; it must be a finite length of at least 0"));
+  return InvalidArgument(" is ",
+                         std::isnan(radius)   ? "NaN"
+                         : std::isinf(radius) ? "infinite"
+                                              : absl::StrCat(radius),
+                         "; it must be a finite length of at least 0");
 }
 
 absl::Status ValidateEnd(const Motion& motion) {
   if (!IsValidPose(motion.end)) return ValidatePose(motion.end);
   if (ValidateMotion(motion).ok()) return absl::OkStatus();
-  return absl::InvalidArgumentError(
+  return InvalidArgument(
       "rotation is opposite to the rotation of pose, so the interpolated quaternion passes through "
       "zero; negate its components to take the shorter path");
 }
@@ -150,7 +146,7 @@ absl::StatusOr<Freshness> DecodeFreshness(const v1::Freshness& message, const St
   freshness.began = began;
   freshness.at_least_revision = message.at_least_revision();
   if (message.at_least_revision() > 0 && message.store_id().empty()) {
-    return absl::InvalidArgumentError(
+    return InvalidArgument(
         "freshness.at_least_revision requires store_id; use the one from the same header");
   }
   if (!message.store_id().empty() && message.store_id() != store.id()) return OtherStore(store);

@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "core/base/status_macros.h"
-#include "server/collisions/placed/scene_groups.h"
+#include "server/collisions/placed/query_settings.h"
 #include "server/contract/errors.h"
 
 namespace hulld::server {

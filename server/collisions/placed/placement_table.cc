@@ -69,28 +69,26 @@ size_t ErrorBytes(const absl::Status& status) {
 absl::Status CheckPacked(const v1::PackedPlacements& packed) {
   if (packed.poses_size() / kPoseNumbers != packed.hulls_size() ||
       packed.poses_size() % kPoseNumbers != 0) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("packed_placements.poses has ", packed.poses_size(), " numbers for ",
-                     packed.hulls_size(), " placements; each needs seven: w x y z and x y z"));
+    return InvalidArgument("packed_placements.poses has ", packed.poses_size(), " numbers for ",
+                           packed.hulls_size(), " placements; each needs seven: w x y z and x y z");
   }
   if (!packed.radii().empty() && packed.radii_size() != packed.hulls_size()) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("packed_placements.radii has ", packed.radii_size(), " numbers for ",
-                     packed.hulls_size(), " placements; give one for each, or none"));
+    return InvalidArgument("packed_placements.radii has ", packed.radii_size(), " numbers for ",
+                           packed.hulls_size(), " placements; give one for each, or none");
   }
   if (!packed.end_poses().empty() && packed.end_poses_size() != packed.poses_size()) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("packed_placements.end_poses has ", packed.end_poses_size(), " numbers for ",
-                     packed.hulls_size(), " placements; set seven for each, or none"));
+    return InvalidArgument("packed_placements.end_poses has ", packed.end_poses_size(),
+                           " numbers for ", packed.hulls_size(),
+                           " placements; set seven for each, or none");
   }
   const auto shapes = static_cast<uint32_t>(packed.shape_sizes_size());
   const uint32_t hulls = static_cast<uint32_t>(packed.hull_ids_size()) + shapes;
   for (int i = 0; i < packed.hulls_size(); ++i) {
     if (packed.hulls(i) >= hulls) {
-      return absl::InvalidArgumentError(absl::StrCat(
-          "packed_placements.hulls[", i, "] is ", packed.hulls(i),
-          ", but packed_placements.hull_ids has ", packed.hull_ids_size(),
-          shapes == 0 ? "" : absl::StrCat(" and shape_sizes ", shapes), "; indices start at 0"));
+      return InvalidArgument("packed_placements.hulls[", i, "] is ", packed.hulls(i),
+                             ", but packed_placements.hull_ids has ", packed.hull_ids_size(),
+                             shapes == 0 ? "" : absl::StrCat(" and shape_sizes ", shapes),
+                             "; indices start at 0");
     }
   }
   return absl::OkStatus();
@@ -102,7 +100,7 @@ absl::Status CheckSubject(const Caller& caller, const v1::Placement& placement,
                           InlineShapes* shapes) {
   if (!placement.has_points()) return CheckHullId(caller, placement.hull_id(), "hull_id");
   if (placement.hull_id().empty()) return DecodeShape(placement.points(), shapes);
-  return absl::InvalidArgumentError("hull_id and points are both set; set one of them");
+  return InvalidArgument("hull_id and points are both set; set one of them");
 }
 
 std::string FieldInList(size_t i) { return absl::StrCat("placements[", i, "]."); }
@@ -117,8 +115,8 @@ absl::StatusOr<std::vector<Vector>> DecodeShapePoints(const v1::PackedPlacements
   const uint64_t sum =
       std::accumulate(packed.shape_sizes().begin(), packed.shape_sizes().end(), uint64_t{0});
   if (sum == points->size()) return points;
-  return absl::InvalidArgumentError(absl::StrCat("packed_placements.shape_sizes add up to ", sum,
-                                                 " points, but shape_points has ", points->size()));
+  return InvalidArgument("packed_placements.shape_sizes add up to ", sum,
+                         " points, but shape_points has ", points->size());
 }
 
 }  // namespace
@@ -130,8 +128,7 @@ absl::StatusOr<PlacementTable> PlacementTable::Make(
                              packed.poses_size() + packed.radii_size() >
                          0;
   if (is_packed && !placements.empty()) {
-    return absl::InvalidArgumentError(
-        "placements and packed_placements are both set; set one of them");
+    return InvalidArgument("placements and packed_placements are both set; set one of them");
   }
   for (const auto& [count, of] :
        {std::pair<int, const char*>{placements.size() + packed.hulls_size(), " placements"},
@@ -482,10 +479,6 @@ void PlacementTable::PlaceAgain(size_t i) {
   if (has_bodies()) bodies_[i] = PlaceBody(i);
 }
 
-void PlacementTable::EncodeHeader(const Store& store, v1::ResponseHeader* header) const {
-  server::EncodeHeader(store, as_of_, header);
-}
-
 size_t PlacementTable::EncodeRows(size_t first, const RowFields& to) const {
   const size_t placements = named_.size() + listed_placements_;
   const size_t rows = table_rows();
@@ -551,32 +544,28 @@ absl::Status CheckNoMotions(const google::protobuf::RepeatedPtrField<v1::Placeme
       moving == placements.end()
           ? "packed_placements.end_poses"
           : absl::StrCat("placements[", moving - placements.begin(), "].end_pose");
-  return absl::InvalidArgumentError(absl::StrCat(
+  return InvalidArgument(
       field, " is set, but ", what,
-      " does not support motions; use CheckCollision, BatchCheckCollisions, or FindCollisions"));
+      " does not support motions; use CheckCollision, BatchCheckCollisions, or FindCollisions");
 }
 
 absl::Status ValidateMoves(const google::protobuf::RepeatedField<uint32_t>& placements,
                            const google::protobuf::RepeatedField<double>& poses, size_t count) {
   const int moved = placements.size();
   if (poses.size() != kPoseNumbers * moved) {
-    return absl::InvalidArgumentError(absl::StrCat("poses has ", poses.size(), " numbers for ",
-                                                   moved,
-                                                   " placements; each needs seven: w x y z and x "
-                                                   "y z"));
+    return InvalidArgument("poses has ", poses.size(), " numbers for ", moved,
+                           " placements; each needs seven: w x y z and x y z");
   }
   std::vector<char> named(count);
   for (int i = 0; i < moved; ++i) {
     const uint32_t placement = placements[i];
     if (placement >= count) {
-      return absl::InvalidArgumentError(absl::StrCat("placements[", i, "] is ", placement,
-                                                     ", but the stream has ", count,
-                                                     "; indices start at 0"));
+      return InvalidArgument("placements[", i, "] is ", placement, ", but the stream has ", count,
+                             "; indices start at 0");
     }
     if (named[placement]) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("placements[", i, "] is ", placement,
-                       ", which is listed twice; list each placement once"));
+      return InvalidArgument("placements[", i, "] is ", placement,
+                             ", which is listed twice; list each placement once");
     }
     named[placement] = true;
     const Pose pose = ReadPose(poses, i);
@@ -592,8 +581,8 @@ std::string PlacementCountText(size_t count) {
 absl::Status ValidatePairs(const google::protobuf::RepeatedField<uint32_t>& pairs,
                            size_t placements, uint64_t max_pairs, const char* what) {
   if (pairs.size() % 2 != 0) {
-    return absl::InvalidArgumentError(absl::StrCat("pairs has an odd number of indices, ",
-                                                   pairs.size(), "; each pair needs two"));
+    return InvalidArgument("pairs has an odd number of indices, ", pairs.size(),
+                           "; each pair needs two");
   }
   const auto count = static_cast<uint64_t>(pairs.size()) / 2;
   if (count > max_pairs) {
@@ -602,9 +591,8 @@ absl::Status ValidatePairs(const google::protobuf::RepeatedField<uint32_t>& pair
   }
   for (int i = 0; i < pairs.size(); ++i) {
     if (pairs[i] >= placements) {
-      return absl::InvalidArgumentError(absl::StrCat("pairs[", i, "] is ", pairs[i], ", but ",
-                                                     PlacementCountText(placements),
-                                                     "; indices start at 0"));
+      return InvalidArgument("pairs[", i, "] is ", pairs[i], ", but ",
+                             PlacementCountText(placements), "; indices start at 0");
     }
   }
   return absl::OkStatus();

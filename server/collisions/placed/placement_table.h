@@ -26,6 +26,7 @@
 #include "core/query/terms/query_options.h"
 #include "hulld/v1/collision.pb.h"
 #include "server/access/caller.h"
+#include "server/contract/errors.h"
 #include "server/registry/body_resolution.h"
 #include "server/registry/registry.h"
 #include "server/wire/decode.h"
@@ -150,8 +151,8 @@ class PlacementTable {
     return HasHull(i) ? std::optional<size_t>(hull_of_[i]) : std::nullopt;
   }
 
-  // Encodes the revision and staleness of the last Resolve.
-  void EncodeHeader(const Store& store, v1::ResponseHeader* header) const;
+  // Revision and staleness of the last Resolve.
+  const AsOf& as_of() const { return as_of_; }
   // Encodes rows of a table, starting with row `first`, as many as fill a message: a version per
   // placement, or per hull named by packed placements, and the problems; then, if certificates are
   // wanted, the hulls of pieces. Returns the first row of the next message, or table_rows() after
@@ -270,11 +271,11 @@ absl::Status CheckNoMotions(const google::protobuf::RepeatedPtrField<v1::Placeme
 template <typename Request>
 absl::Status CheckOrder(const Request& request, bool is_open, const char* twice) {
   if (!request.has_open() && !request.has_update()) {
-    return absl::InvalidArgumentError("the message is empty; set open or update");
+    return InvalidArgument("the message is empty; set open or update");
   }
-  if (request.has_open() && is_open) return absl::InvalidArgumentError(twice);
+  if (request.has_open() && is_open) return InvalidArgument(twice);
   if (request.has_open() || is_open) return absl::OkStatus();
-  return absl::InvalidArgumentError("the first message must be open, not update");
+  return InvalidArgument("the first message must be open, not update");
 }
 
 // Validates an update of a stream with `count` placements: the new pose of each of `placements`, as

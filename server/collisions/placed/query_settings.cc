@@ -29,9 +29,8 @@ absl::StatusOr<QueryOptions> MakeQueryOptions(v1::Method method, const v1::Wante
                                               const CallLifetime& lifetime) {
   const bool is_textbook = method == v1::METHOD_TEXTBOOK_SAT;
   if (method != v1::METHOD_UNSPECIFIED && method != v1::METHOD_CERTIFIED_SEARCH && !is_textbook) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("method is ", static_cast<int>(method),
-                     "; use METHOD_CERTIFIED_SEARCH (the default) or METHOD_TEXTBOOK_SAT"));
+    return InvalidArgument("method is ", static_cast<int>(method),
+                           "; use METHOD_CERTIFIED_SEARCH (the default) or METHOD_TEXTBOOK_SAT");
   }
   QueryOptions options;
   options.method = is_textbook ? Method::kTextbookSat : Method::kCertifiedSearch;
@@ -46,8 +45,8 @@ absl::StatusOr<QueryOptions> MakeQueryOptions(v1::Method method, const v1::Wante
   options.tolerance = tolerance;
   HULLD_RETURN_IF_ERROR(ValidateOptions(options, kFieldNames));
   if (wanted.clearance() < 0) {
-    return absl::InvalidArgumentError(absl::StrCat("wanted.clearance is ", wanted.clearance(),
-                                                   "; it must be a length of at least 0"));
+    return InvalidArgument("wanted.clearance is ", wanted.clearance(),
+                           "; it must be a length of at least 0");
   }
   if (wanted.has_max_time_error() || wanted.has_resolution()) {
     const absl::Status valid = ValidateMotionOptions(MakeMotionOptions(wanted, options));
@@ -88,9 +87,9 @@ absl::Status ValidateForMotions(const QueryOptions& options) {
   };
   for (const auto& [is_set, name] : excluded) {
     if (!is_set) continue;
-    return absl::InvalidArgumentError(absl::StrCat(name,
-                                                   " cannot be combined with end_pose; query the "
-                                                   "first contact, then query again at its pose"));
+    return InvalidArgument(
+        name,
+        " cannot be combined with end_pose; query the first contact, then query again at its pose");
   }
   return absl::OkStatus();
 }

@@ -89,7 +89,19 @@ void BodyTable::DropSome(Locked& locked) {
   }
 }
 
-std::string QuotedBody(const std::string& id) { return absl::StrCat("body \"", id, "\""); }
+std::string Quoted(const std::string& kind, const std::string& id) {
+  return absl::StrCat(kind, " \"", id, "\"");
+}
+
+absl::Status NotFound(const std::string& kind, const std::string& id, bool is_other_kind) {
+  const bool is_body = kind == "body";
+  const char* const other =
+      is_body ? "\" is a hull, not a body" : "\" is a body; this call requires a hull";
+  return WithReason(absl::NotFoundError(is_other_kind ? absl::StrCat("\"", id, other)
+                                                      : Quoted(kind, id) + " not found"),
+                    is_body ? v1::ERROR_REASON_BODY_NOT_FOUND : v1::ERROR_REASON_HULL_NOT_FOUND,
+                    {{kind + "_id", id}});
+}
 
 absl::Status IdTaken(const std::string& kind, const std::string& id) {
   return WithReason(absl::AlreadyExistsError(
@@ -101,9 +113,18 @@ absl::Status IdTaken(const std::string& kind, const std::string& id) {
                     {{kind + "_id", id}});
 }
 
-absl::Status BodyNotFound(const std::string& id) {
-  return WithReason(absl::NotFoundError(absl::StrCat(QuotedBody(id), " not found")),
-                    v1::ERROR_REASON_BODY_NOT_FOUND, {{"body_id", id}});
+absl::Status CheckRevision(const std::string& kind, const std::string& id, uint64_t revision,
+                           std::optional<uint64_t> if_revision) {
+  if (if_revision.value_or(revision) == revision) return absl::OkStatus();
+  const std::string found =
+      revision == 0
+          ? absl::StrCat(" does not exist or is damaged, so it is not at revision ", *if_revision)
+          : absl::StrCat(" is at revision ", revision, ", not ", *if_revision);
+  return WithReason(
+      absl::AbortedError(
+          absl::StrCat(Quoted(kind, id), found, " (if_revision); read it again, then retry")),
+      v1::ERROR_REASON_REVISION_MISMATCH,
+      {{kind + "_id", id}, {"if_revision", *if_revision}, {"current_revision", revision}});
 }
 
 }  // namespace hulld::server

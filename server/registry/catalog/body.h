@@ -149,11 +149,19 @@ struct ServedBody {
   const HullView& hull_of(uint32_t piece) const { return hulls[body->pieces()[piece].hull]; }
 };
 
+// Errors about a hull or a body. kind: "hull" or "body".
+//
+// Returns the text that names it, as in: hull "a/b".
+std::string Quoted(const std::string& kind, const std::string& id);
+// NOT_FOUND. is_other_kind: the ID belongs to an object of the other kind, which the message says.
+absl::Status NotFound(const std::string& kind, const std::string& id, bool is_other_kind = false);
 // ALREADY_EXISTS: the ID requested for a hull belongs to a body, or the reverse. kind: that of the
-// existing object, "hull" or "body".
+// existing object.
 absl::Status IdTaken(const std::string& kind, const std::string& id);
-absl::Status BodyNotFound(const std::string& id);
-std::string QuotedBody(const std::string& id);
+// Returns OK if it is at the required revision, if any. ABORTED: it is not. revision: the current
+// one; 0: it does not exist, or its record is damaged.
+absl::Status CheckRevision(const std::string& kind, const std::string& id, uint64_t revision,
+                           std::optional<uint64_t> if_revision);
 
 }  // namespace hulld::server
 

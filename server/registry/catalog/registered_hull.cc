@@ -393,40 +393,20 @@ const std::shared_ptr<const ServedHull>& EmptyServedHull() {
   return *kServed;
 }
 
-std::string QuotedHull(const std::string& id) { return absl::StrCat("hull \"", id, "\""); }
-
 absl::Status Gone(const std::string& id, const char* how) {
   return WithReason(
-      absl::FailedPreconditionError(absl::StrCat(QuotedHull(id), " was ", how,
+      absl::FailedPreconditionError(absl::StrCat(Quoted("hull", id), " was ", how,
                                                  " while points were being streamed into it; start "
                                                  "a new stream and send all points again")),
       v1::ERROR_REASON_HULL_GONE, {{"hull_id", id}});
 }
 
 absl::Status StoreDisagrees(const HullRecord& record) {
-  return absl::UnavailableError(absl::StrCat(
-      "the store does not contain ", QuotedHull(record.hull_id), " as of revision ",
+  return Unavailable(
+      "the store does not contain ", Quoted("hull", record.hull_id), " as of revision ",
       record.revision,
       ", the last known to this server; if this persists, the database was changed outside of "
-      "hulld: restart this server"));
-}
-
-absl::Status HullNotFound(const std::string& id) {
-  return WithReason(absl::NotFoundError(absl::StrCat(QuotedHull(id), " not found")),
-                    v1::ERROR_REASON_HULL_NOT_FOUND, {{"hull_id", id}});
-}
-
-absl::Status RevisionMismatch(const std::string& kind, const std::string& id, uint64_t revision,
-                              uint64_t if_revision) {
-  const std::string found =
-      revision == 0
-          ? absl::StrCat(" does not exist or is damaged, so it is not at revision ", if_revision)
-          : absl::StrCat(" is at revision ", revision, ", not ", if_revision);
-  return WithReason(
-      absl::AbortedError(
-          absl::StrCat(kind, " \"", id, "\"", found, " (if_revision); read it again, then retry")),
-      v1::ERROR_REASON_REVISION_MISMATCH,
-      {{kind + "_id", id}, {"if_revision", if_revision}, {"current_revision", revision}});
+      "hulld: restart this server");
 }
 
 }  // namespace hulld::server

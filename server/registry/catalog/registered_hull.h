@@ -301,17 +301,10 @@ void Answer(Locked& locked, const Reply<T>& done, std::type_identity_t<absl::Sta
   locked.Defer([done, result = std::move(result)] { done(result); });
 }
 
-std::string QuotedHull(const std::string& id);
 // FAILED_PRECONDITION: the hull of a session ended. how: for example, "deleted".
 absl::Status Gone(const std::string& id, const char* how);
-absl::Status HullNotFound(const std::string& id);
-
 // UNAVAILABLE: a shared store lacks an expected record, and no peer server removed it.
 absl::Status StoreDisagrees(const HullRecord& record);
-// ABORTED: the hull or body is not at the required revision. kind: "hull" or "body". revision: the
-// current one; 0: it does not exist, or its record is damaged.
-absl::Status RevisionMismatch(const std::string& kind, const std::string& id, uint64_t revision,
-                              uint64_t if_revision);
 
 }  // namespace hulld::server
 

@@ -39,7 +39,7 @@ absl::Status GoneWhileStreaming(const RegisteredHull& hull) {
 absl::Status Superseded() { return absl::AbortedError("a peer server changed the hull first"); }
 
 absl::Status TooManyWriters(const StoredHull& hull, uint64_t limit) {
-  return LimitExceeded(absl::StrCat(QuotedHull(hull.record.hull_id), " has ", hull.writer_count,
+  return LimitExceeded(absl::StrCat(Quoted("hull", hull.record.hull_id), " has ", hull.writer_count,
                                     " writers; append with one of their writer_ids"),
                        limit, "max-writers-per-hull");
 }
@@ -50,19 +50,16 @@ absl::Status CheckPointCount(const HullRecord& record, const Chunk& chunk, const
       chunk.points.size() <= limits.max_points_per_hull - received) {
     return absl::OkStatus();
   }
-  return LimitExceeded(absl::StrCat(QuotedHull(record.hull_id), " has received ", received,
+  return LimitExceeded(absl::StrCat(Quoted("hull", record.hull_id), " has received ", received,
                                     " points, and the chunk has ", chunk.points.size(), " more"),
                        limits.max_points_per_hull, "max-points-per-hull");
 }
 
 absl::Status CheckChunkRevision(const AppendSession& session, const HullRecord& record,
                                 const Chunk& chunk) {
-  if (!chunk.if_revision.has_value() || *chunk.if_revision == record.revision) {
-    return absl::OkStatus();
-  }
   const bool untouched = record.revision == record.create_revision;
-  if (*chunk.if_revision == 0 && session.created_hull && untouched) return absl::OkStatus();
-  return RevisionMismatch("hull", record.hull_id, record.revision, *chunk.if_revision);
+  if (chunk.if_revision == 0 && session.created_hull && untouched) return absl::OkStatus();
+  return CheckRevision("hull", record.hull_id, record.revision, chunk.if_revision);
 }
 
 // Adds the points missing from a builder. Returns false if the result differs from the record; the
@@ -110,7 +107,7 @@ void LocalChanges::OpenAppend(const std::string& id, const std::string& writer_i
 void LocalChanges::OpenNew(Locked& locked, const std::shared_ptr<OpenRequest>& request,
                            const LockedTask& again) {
   if (!request->create_if_absent) {
-    return Answer(locked, request->done, state_.NoSuchHull(request->hull_id));
+    return Answer(locked, request->done, state_.NoSuch("hull", request->hull_id));
   }
   CreateNew(locked, request->hull_id, request->done, again,
             [=, this](Locked& later, const HullPointer& created) {
@@ -319,7 +316,7 @@ absl::StatusOr<LocalChanges::BuiltChunk> LocalChanges::Build(Locked& locked, Reg
   if (hull.state.work() == HullState::Work::kReverting) {
     hull.DiscardBuilder(locked);
     if (peers_.has_peers()) return Superseded();
-    return absl::UnavailableError("an earlier change could not be stored");
+    return Unavailable("an earlier change could not be stored");
   }
   if (!added.ok()) return BuildFailure(hull, added.status());
   if (hull.state.damaged()) {
@@ -403,7 +400,7 @@ absl::Status LocalChanges::BuildFailure(RegisteredHull& hull, const absl::Status
   if (absl::IsDataLoss(cause)) state_.MarkDamaged(hull, cause);
   if (!absl::IsResourceExhausted(cause)) return cause;
   return LimitExceeded(
-      absl::StrCat(QuotedHull(hull.head().record.hull_id), " would have too many vertices"),
+      absl::StrCat(Quoted("hull", hull.head().record.hull_id), " would have too many vertices"),
       state_.limits.max_vertices_per_hull, "max-vertices-per-hull");
 }
 

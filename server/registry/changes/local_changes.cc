@@ -69,10 +69,10 @@ void LocalChanges::Create(const std::string& id, bool if_absent, const Reply<Put
               });
         }
         if (!if_absent) {
-          Answer(
-              locked, done,
-              WithReason(absl::AlreadyExistsError(absl::StrCat(QuotedHull(id), " already exists")),
-                         v1::ERROR_REASON_HULL_EXISTS, {{"hull_id", id}}));
+          Answer(locked, done,
+                 WithReason(
+                     absl::AlreadyExistsError(absl::StrCat(Quoted("hull", id), " already exists")),
+                     v1::ERROR_REASON_HULL_EXISTS, {{"hull_id", id}}));
         } else if (existing->state.damaged()) {
           Answer(locked, done, existing->state.damage());
         } else {
@@ -113,11 +113,11 @@ void LocalChanges::Delete(const std::string& kind, const std::string& id,
     const HullPointer hull = is_body ? nullptr : state_.Find(id);
     const std::shared_ptr<const Body> body = is_body ? state_.FindBody(id) : nullptr;
     if (hull == nullptr && body == nullptr) {
-      return Answer(locked, done, is_body ? state_.NoSuchBody(id) : state_.NoSuchHull(id));
+      return Answer(locked, done, state_.NoSuch(kind, id));
     }
     const uint64_t revision = is_body ? body->record().revision : hull->committed().record.revision;
-    if (if_revision.has_value() && *if_revision != revision) {
-      return Answer(locked, done, RevisionMismatch(kind, id, revision, *if_revision));
+    if (absl::Status s = CheckRevision(kind, id, revision, if_revision); !s.ok()) {
+      return Answer(locked, done, s);
     }
     const auto finish = [=, this](Locked& later, const absl::Status& status,
                                   const Change& deletion) {
@@ -160,11 +160,9 @@ absl::Status LocalChanges::CheckReplacement(const RegisteredHull* previous,
                                             const Replacement& replacement) const {
   const std::string& id = replacement.hull_id;
   const uint64_t revision = previous == nullptr ? 0 : previous->committed().record.revision;
-  if (replacement.if_revision.value_or(revision) != revision) {
-    return RevisionMismatch("hull", id, revision, *replacement.if_revision);
-  }
+  HULLD_RETURN_IF_ERROR(CheckRevision("hull", id, revision, replacement.if_revision));
   if (previous != nullptr) return absl::OkStatus();
-  if (!replacement.create_if_absent) return state_.NoSuchHull(id);
+  if (!replacement.create_if_absent) return state_.NoSuch("hull", id);
   if (state_.bodies.contains(id)) return IdTaken("body", id);
   return state_.CheckHullCount();
 }
@@ -241,9 +239,7 @@ absl::Status LocalChanges::CheckPutBody(Locked& locked, const std::string& id,
   if (state_.hulls.contains(id)) return IdTaken("hull", id);
   const std::shared_ptr<const Body> body = state_.FindBody(id);
   const uint64_t revision = body == nullptr ? 0 : body->record().revision;
-  if (if_revision.has_value() && *if_revision != revision) {
-    return RevisionMismatch("body", id, revision, *if_revision);
-  }
+  HULLD_RETURN_IF_ERROR(CheckRevision("body", id, revision, if_revision));
   return body == nullptr ? state_.CheckHullCount() : absl::OkStatus();
 }
 

@@ -1,7 +1,5 @@
 #include "server/registry/records/record_reader.h"
 
-#include <absl/strings/str_cat.h>
-
 #include <algorithm>
 #include <cstdint>
 #include <memory>
@@ -10,6 +8,7 @@
 
 #include "core/base/check.h"
 #include "core/base/status_macros.h"
+#include "server/contract/errors.h"
 #include "server/contract/stopped_call.h"
 #include "server/registry/catalog/registered_hull.h"
 
@@ -22,15 +21,14 @@ constexpr size_t kMaxThreads = 2;
 
 // The store reported an older revision than `queried_at`, its revision before the query.
 absl::Status RolledBack(uint64_t found, uint64_t queried_at) {
-  return absl::UnavailableError(absl::StrCat(
+  return Unavailable(
       "the store is at revision ", found, " but was at ", queried_at,
-      " earlier: it was restored to an earlier state, or another database is answering"));
+      " earlier: it was restored to an earlier state, or another database is answering");
 }
 
 absl::Status IsAhead(uint64_t found, uint64_t known) {
-  return absl::UnavailableError(absl::StrCat("the store contains changes up to revision ", found,
-                                             ", but only changes up to ", known,
-                                             " are known to be committed; retry"));
+  return Unavailable("the store contains changes up to revision ", found,
+                     ", but only changes up to ", known, " are known to be committed; retry");
 }
 
 }  // namespace

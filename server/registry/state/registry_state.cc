@@ -66,17 +66,8 @@ std::shared_ptr<const Body> RegistryState::FindBody(const std::string& id) {
   return entry == nullptr ? nullptr : entry->committed();
 }
 
-absl::Status RegistryState::NoSuchHull(const std::string& id) const {
-  if (!bodies.contains(id)) return HullNotFound(id);
-  return WithReason(
-      absl::NotFoundError(absl::StrCat("\"", id, "\" is a body; this call requires a hull")),
-      v1::ERROR_REASON_HULL_NOT_FOUND, {{"hull_id", id}});
-}
-
-absl::Status RegistryState::NoSuchBody(const std::string& id) const {
-  if (!hulls.contains(id)) return BodyNotFound(id);
-  return WithReason(absl::NotFoundError(absl::StrCat("\"", id, "\" is a hull, not a body")),
-                    v1::ERROR_REASON_BODY_NOT_FOUND, {{"body_id", id}});
+absl::Status RegistryState::NoSuch(const std::string& kind, const std::string& id) const {
+  return NotFound(kind, id, kind == "body" ? hulls.contains(id) : bodies.contains(id));
 }
 
 void RegistryState::AddStored(const std::string& id, const absl::StatusOr<StoredHull>& stored) {

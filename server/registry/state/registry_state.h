@@ -1,6 +1,7 @@
 #ifndef HULLD_SERVER_REGISTRY_STATE_REGISTRY_STATE_H_
 #define HULLD_SERVER_REGISTRY_STATE_REGISTRY_STATE_H_
 
+#include <absl/hash/hash.h>
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
@@ -9,13 +10,14 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "core/query/placed/live_hull.h"
 #include "server/process/metrics.h"
 #include "server/process/task_pool.h"
 #include "server/registry/catalog/body.h"
 #include "server/registry/catalog/hull_table.h"
-#include "server/registry/catalog/known_hulls.h"
 #include "server/registry/catalog/registry_types.h"
 #include "server/registry/memory/locked.h"
 #include "server/registry/memory/memory_budget.h"
@@ -24,6 +26,35 @@
 #include "server/store/store.h"
 
 namespace hulld::server {
+
+// Recent reader-visible changes of hulls, in order, each stored as a hash of the ID. Not
+// thread-safe.
+class RecentChanges {
+ public:
+  // Maximum number of changes: half a megabyte when full.
+  static constexpr uint64_t kCapacity = 1 << 16;
+
+  // Differs between processes, so that no client can craft a request of IDs with equal hashes.
+  static uint64_t HashOf(std::string_view id) { return absl::HashOf(id); }
+
+  void Note(std::string_view id) {
+    if (end_ < kCapacity) {
+      hashes_.push_back(HashOf(id));
+    } else {
+      hashes_[end_ % kCapacity] = HashOf(id);
+    }
+    ++end_;
+  }
+  // Position after the last change.
+  uint64_t end() const { return end_; }
+  // Returns true if all changes from this position on are retained.
+  bool Knows(uint64_t change) const { return end_ - change <= kCapacity; }
+  uint64_t at(uint64_t change) const { return hashes_[change % kCapacity]; }
+
+ private:
+  std::vector<uint64_t> hashes_;
+  uint64_t end_ = 0;
+};
 
 // State shared by the parts of a registry, and its state machine. All parts read committed state
 // here. The Apply functions are the only ones that change what readers see. Each applies one
@@ -59,9 +90,8 @@ class RegistryState {
   // Returns the committed body; null if there is none. Requires IsKnown(id) (not checked: a body
   // whose read failed is unknown).
   std::shared_ptr<const Body> FindBody(const std::string& id);
-  // NOT_FOUND; if the ID belongs to the other kind, the message says so.
-  absl::Status NoSuchHull(const std::string& id) const;
-  absl::Status NoSuchBody(const std::string& id) const;
+  // NOT_FOUND; if the ID belongs to the other kind, the message says so. kind: "hull" or "body".
+  absl::Status NoSuch(const std::string& kind, const std::string& id) const;
 
   // Adds a stored hull, at rest or as damaged. Requires: the hull table has no hull with the ID.
   void AddStored(const std::string& id, const absl::StatusOr<StoredHull>& stored);

@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "core/base/status_macros.h"
+#include "server/contract/errors.h"
 
 namespace hulld::server {
 namespace {
@@ -76,7 +77,7 @@ absl::StatusOr<std::string> Compare(rocksdb::FileSystem& files, const std::strin
                                     const LogMark::Synced& synced) {
   const std::string name = std::filesystem::path(path).filename();
   const auto failure = [&](const IOStatus& status) {
-    return absl::UnavailableError(absl::StrCat("cannot read ", path, ": ", status.ToString()));
+    return Unavailable("cannot read ", path, ": ", status.ToString());
   };
   if (files.FileExists(path, IOOptions(), nullptr).IsNotFound()) {
     return absl::StrCat("the log ", name, " is missing");
@@ -150,7 +151,7 @@ absl::StatusOr<std::optional<LogMark>> ReadLogMark(rocksdb::FileSystem& files,
     if (!newest.has_value() || mark->generation > newest->generation) newest = std::move(mark);
   }
   if (!status.ok()) {
-    return absl::UnavailableError(absl::StrCat("cannot read ", path, ": ", status.ToString()));
+    return Unavailable("cannot read ", path, ": ", status.ToString());
   }
   if (!newest.has_value()) return absl::DataLossError(absl::StrCat(path, " is damaged"));
   return newest;

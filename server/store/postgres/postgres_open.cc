@@ -133,10 +133,6 @@ constexpr char kPrepareClaims[] = R"(
 
 constexpr char kPrepareReads[] = R"(
     PREPARE hulld_owner AS SELECT owner FROM hulld.store;
-    PREPARE hulld_hulls_after(text, integer) AS
-      SELECT hull_id, record FROM hulld.hulls WHERE hull_id > $1 ORDER BY hull_id LIMIT $2;
-    PREPARE hulld_bodies_after(text, integer) AS
-      SELECT body_id, body FROM hulld.bodies WHERE body_id > $1 ORDER BY body_id LIMIT $2;
     PREPARE hulld_find(text[]) AS
       SELECT s.revision, r.id, r.is_body, false, r.value
       FROM hulld.store s LEFT JOIN (
@@ -376,7 +372,7 @@ absl::Status PostgresStore::WaitForTurn() {
   if (options_.take_over) return absl::OkStatus();
   // Retries quickly at first: a server that was just killed may still hold the lock.
   for (auto pause = kMinLockPause;; pause = std::min(2 * pause, kMaxLockPause)) {
-    absl::StatusOr<bool> locked = absl::UnavailableError("");
+    absl::StatusOr<bool> locked = Unavailable("");
     if (keeper_session_ != nullptr) locked = TryLock(*keeper_session_);
     has_lock_ = locked.ok() && *locked;
     if (has_lock_) return absl::OkStatus();

@@ -1,20 +1,17 @@
 // Reading from the store: records, vertices of a hull, a writer's sequence.
 #include <absl/status/status.h>
-#include <absl/strings/str_cat.h>
 
 #include <algorithm>
 #include <optional>
 #include <utility>
 
 #include "core/base/status_macros.h"
+#include "server/contract/errors.h"
 #include "server/store/postgres/postgres_store.h"
 #include "server/store/store_keys.h"
 
 namespace hulld::server {
 namespace {
-
-// Rows per portion: about 100 bytes each, except bodies with many pieces.
-constexpr uint32_t kRowsPerPortion = 4096;
 
 // Selects the deltas of a hull after one revision and up to another.
 Statement SelectDeltas(const HullRecord& hull, uint64_t after, uint64_t up_to) {
@@ -74,8 +71,7 @@ absl::StatusOr<std::vector<Rows>> PostgresStore::Read(std::vector<Statement> sta
   absl::StatusOr<std::vector<Rows>> rows = readers_.Execute(statements);
   if (!rows.ok()) {
     ++read_failures_;
-    return absl::UnavailableError(
-        absl::StrCat("cannot read from the database: ", rows.status().message()));
+    return Unavailable("cannot read from the database: ", rows.status().message());
   }
   const Rows owner = std::move(rows->back());
   rows->pop_back();
@@ -89,33 +85,6 @@ absl::StatusOr<Rows> PostgresStore::ReadOne(Statement statement) {
   statements.push_back(std::move(statement));
   HULLD_ASSIGN_OR_RETURN(std::vector<Rows> rows, Read(std::move(statements)));
   return std::move(rows.front());
-}
-
-absl::Status PostgresStore::ForEachRow(
-    const char* statement, const std::function<void(const std::string&, std::string_view)>& visit) {
-  std::string last;
-  while (true) {
-    HULLD_ASSIGN_OR_RETURN(
-        const Rows rows,
-        ReadOne({.name = statement, .parameters = {last, EncodeInteger(kRowsPerPortion)}}));
-    for (int i = 0; i < rows.count(); ++i) {
-      last = std::string(rows.at(i, 0));
-      visit(last, rows.at(i, 1));
-    }
-    if (static_cast<uint32_t>(rows.count()) < kRowsPerPortion) return absl::OkStatus();
-  }
-}
-
-absl::Status PostgresStore::ForEachHull(const StoredHullVisitor& visit) {
-  return ForEachRow("hulld_hulls_after", [&](const std::string& hull_id, std::string_view sealed) {
-    visit(hull_id, UnsealStoredHull(hull_id, sealed));
-  });
-}
-
-absl::Status PostgresStore::ForEachBody(const StoredBodyVisitor& visit) {
-  return ForEachRow("hulld_bodies_after", [&](const std::string& body_id, std::string_view sealed) {
-    visit(body_id, UnsealStoredBody(body_id, sealed));
-  });
 }
 
 absl::StatusOr<FoundRecords> PostgresStore::FindRecords(std::span<const std::string> ids) {

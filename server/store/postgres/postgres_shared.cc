@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/base/status_macros.h"
+#include "server/contract/errors.h"
 #include "server/process/random_id.h"
 #include "server/store/postgres/batch_statements.h"
 #include "server/store/postgres/postgres_store.h"
@@ -160,22 +161,20 @@ absl::Status PostgresStore::CheckStore(const Rows& rows) {
     End(Superseded(rows.at(0, 4)));
   } else if (rows.at(0, 10) != id_) {
     End(
-        absl::UnavailableError("the store was restored to an earlier state and has a new ID; this "
-                               "server exits; restart it to serve the restored store"));
+        Unavailable("the store was restored to an earlier state and has a new ID; this "
+                    "server exits; restart it to serve the restored store"));
   } else if (rows.bigint(0, 0) < batch_) {
     has_lost_batches_ = true;
-    End(absl::UnavailableError(
-        absl::StrCat("the database has lost ", batch_ - rows.bigint(0, 0),
-                     " committed batches (failover to a lagging standby, or a restored backup); "
-                     "the store gets a new ID; this server and its peers exit; restart them")));
+    End(Unavailable("the database has lost ", batch_ - rows.bigint(0, 0),
+                    " committed batches (failover to a lagging standby, or a restored backup); "
+                    "the store gets a new ID; this server and its peers exit; restart them"));
   } else if (rows.bigint(0, 3) > batch_) {
-    End(absl::UnavailableError(
-        absl::StrCat("this server is more than ", kKeptBatches,
-                     " batches behind its peers and exits; restart it to catch up")));
+    End(Unavailable("this server is more than ", kKeptBatches,
+                    " batches behind its peers and exits; restart it to catch up"));
   } else if (rows.count() > kMaxFollowed) {
-    End(absl::UnavailableError(absl::StrCat(
+    End(Unavailable(
         "peer servers changed more than ", kMaxFollowed,
-        " hulls and bodies since this server's last sync; it exits; restart it to catch up")));
+        " hulls and bodies since this server's last sync; it exits; restart it to catch up"));
   }
   return ended();
 }
@@ -231,8 +230,8 @@ absl::Status PostgresStore::Fetch() {
     return noted;
   }
   ++read_failures_;
-  return absl::UnavailableError(absl::StrCat(
-      "cannot read changes of peer servers from the database: ", rows.status().message()));
+  return Unavailable("cannot read changes of peer servers from the database: ",
+                     rows.status().message());
 }
 
 // Runs one transaction in two round trips. The first takes the commit lock until the end of the

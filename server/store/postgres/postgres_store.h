@@ -115,8 +115,6 @@ class PostgresStore : public Store, public PeerFeed {
   std::vector<std::optional<std::vector<Vector>>> LoadGrowth(
       std::span<const HullGrowth> hulls) override;
   void OnPeerCommit(std::function<void()> committed) override;
-  absl::Status ForEachHull(const StoredHullVisitor& visit) override;
-  absl::Status ForEachBody(const StoredBodyVisitor& visit) override;
   bool supports_lookup() const override { return true; }
   absl::StatusOr<FoundRecords> FindRecords(std::span<const std::string> ids) override;
   absl::StatusOr<FoundRecords> ListRecords(const std::string& prefix, const std::string& after,
@@ -228,9 +226,6 @@ class PostgresStore : public Store, public PeerFeed {
   static absl::Status CheckRecord(const HullRecord& hull, const Rows& rows);
   absl::Status ExplainDamage(const StoredHull& hull, const absl::Status& damage);
 
-  // Visits every row of a table, in byte order of the IDs: its ID and its sealed value.
-  absl::Status ForEachRow(const char* statement,
-                          const std::function<void(const std::string&, std::string_view)>& visit);
   // Return the results of statements that ran while this was the active server.
   absl::StatusOr<std::vector<Rows>> Read(std::vector<Statement> statements);
   absl::StatusOr<Rows> ReadOne(Statement statement);

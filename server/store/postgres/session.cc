@@ -69,14 +69,14 @@ constexpr struct {
 
 absl::StatusOr<Conninfo> ParseConninfo(const std::string& text) {
   const std::string trimmed(absl::StripAsciiWhitespace(text));
-  if (trimmed.empty()) return absl::InvalidArgumentError("it is empty");
+  if (trimmed.empty()) return InvalidArgument("it is empty");
   // libpq's message would quote the text.
   char* words = nullptr;
   const std::unique_ptr<PQconninfoOption, decltype(&PQconninfoFree)> options(
       PQconninfoParse(trimmed.c_str(), &words), PQconninfoFree);
   PQfreemem(words);
   if (options == nullptr) {
-    return absl::InvalidArgumentError(
+    return InvalidArgument(
         "it is not a libpq connection string, such as 'host=db.example dbname=hulld user=hulld "
         "password=...' (a value with spaces in single quotes) or "
         "'postgresql://hulld@db.example/hulld'");
@@ -94,7 +94,7 @@ absl::StatusOr<Conninfo> ParseConninfo(const std::string& text) {
   };
   if (holds("host", "@", false) || holds("dbname", "@", false) ||
       holds("port", "0123456789,", true)) {
-    return absl::InvalidArgumentError(
+    return InvalidArgument(
         "its host or database contains an @, or its port is not a number; in the password of a "
         "URI, write @ as %40 and / as %2F");
   }
@@ -159,7 +159,7 @@ std::string Session::Describe() const {
 }
 
 absl::Status Session::Lost(const std::string& what) {
-  lost_ = absl::UnavailableError(what);
+  lost_ = Unavailable(what);
   lost_.SetPayload(kLostPayload, absl::Cord("1"));
   return lost_;
 }
@@ -197,7 +197,7 @@ absl::Status Session::ErrorOf(const PGresult* result) {
       severity == "PANIC") {
     return Lost(message);
   }
-  absl::Status status = absl::UnavailableError(message);
+  absl::Status status = Unavailable(message);
   if (state == kDiskFull) {
     status = WithReason(absl::ResourceExhaustedError(message), v1::ERROR_REASON_DISK_FULL);
   }

@@ -1,5 +1,7 @@
 // TLS: accepted and rejected clients, and reloading of changed files.
 
+#include "server/access/tls.h"
+
 #include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,7 +14,6 @@
 #include <filesystem>
 #include <fstream>
 
-#include "server/access/tls_identity.h"
 #include "server/config_check.h"
 #include "tests/server/harness/test_certificates.h"
 #include "tests/server/harness/test_server.h"

@@ -1,7 +1,5 @@
 // Memory of requests: counted before parsing, and limited.
 
-#include "server/call/request_memory.h"
-
 #include <gmock/gmock.h>
 #include <google/protobuf/stubs/logging.h>
 #include <google/protobuf/unknown_field_set.h>

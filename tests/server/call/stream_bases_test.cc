@@ -14,8 +14,7 @@
 
 #include "hulld/v1/collision.grpc.pb.h"
 #include "hulld/v1/hull.grpc.pb.h"
-#include "server/call/pulled_stream.h"
-#include "server/call/queued_stream.h"
+#include "server/call/call_stream.h"
 
 namespace hulld::server {
 namespace stream_bases_test {

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "server/collisions/ranked_pairs.h"
-#include "tests/server/bodies/body_fixture.h"
+#include "tests/server/hulls/body_fixture.h"
 
 namespace hulld::server {
 namespace nearest_pairs_test {

@@ -223,8 +223,8 @@ TEST_P(MigrationTest, AnInterruptedRunIsResumed) {
     // A partial copy is not mistaken for a complete one.
     EXPECT_TRUE(absl::IsDataLoss(migration->Compare(interrupted.store())));
     uint64_t held = 0;
-    ASSERT_TRUE(
-        interrupted.store().ForEachHull([&held](const auto&, const auto&) { ++held; }).ok());
+    const auto count = [&held](const auto&...) { ++held; };
+    ASSERT_TRUE(interrupted.store().ForEachRecord(count, [](const auto&...) {}).ok());
     EXPECT_EQ(held > before, batches > 0);
     before = held;
   }
@@ -270,7 +270,7 @@ TEST_P(MigrationTest, ASourceWithChangedCountsIsCopiedAgain) {
     InterruptedTarget interrupted(*std::move(target), 2);
     EXPECT_FALSE(Migration::Read(**source, [](auto...) {})->CopyTo(interrupted).ok());
     const auto note = [&copied](const std::string& id, const auto&) { copied.push_back(id); };
-    ASSERT_TRUE(interrupted.store().ForEachHull(note).ok());
+    ASSERT_TRUE(interrupted.store().ForEachRecord(note, [](const auto&...) {}).ok());
     ASSERT_FALSE(copied.empty());
   }
   {

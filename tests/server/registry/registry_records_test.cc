@@ -26,12 +26,8 @@ class VastStore : public MemoryStore {
   bool supports_lookup() const override { return true; }
   uint64_t revision() const override { return kHulls; }
   StoreTotals totals() const override { return {kHulls, 0, kBodies}; }
-  absl::Status ForEachHull(const StoredHullVisitor&) override {
-    ADD_FAILURE() << "all hulls are read";
-    return absl::OkStatus();
-  }
-  absl::Status ForEachBody(const StoredBodyVisitor&) override {
-    ADD_FAILURE() << "all bodies are read";
+  absl::Status ForEachRecord(const StoredHullVisitor&, const StoredBodyVisitor&) override {
+    ADD_FAILURE() << "all records are read";
     return absl::OkStatus();
   }
   absl::StatusOr<FoundRecords> FindRecords(std::span<const std::string> ids) override {

@@ -180,7 +180,8 @@ TEST_P(StoreRecovery, BodiesAreRestoredAndDamagedIndividually) {
   Start();
   EXPECT_EQ(CountKeys(kBodyPrefix), 2);
   std::vector<std::string> seen;
-  const absl::Status read = hulls_->store().ForEachBody(
+  const absl::Status read = hulls_->store().ForEachRecord(
+      [](const auto&...) {},
       [&](const std::string& id, const absl::StatusOr<StoredBody>& body) {
         seen.push_back(id);
         EXPECT_EQ(body.ok(), id == "changed") << body.status();

@@ -10,13 +10,13 @@
 #include <string>
 #include <utility>
 
+#include "server/access/caller.h"
 #include "server/contract/errors.h"
-#include "server/contract/hull_id.h"
 #include "server/process/listen_address.h"
 #include "server/process/log.h"
 #include "server/store/memory_store.h"
 #include "server/wire/decode.h"
-#include "server/wire/page_token.h"
+#include "server/wire/unary_answers.h"
 
 namespace hulld::server {
 namespace validation_test {

@@ -42,14 +42,15 @@ absl::Status SharedStore::End(const char* what, const absl::Status& status) {
 }
 
 // Not an atomic snapshot.
-absl::Status SharedStore::ForEachHull(const StoredHullVisitor& visit) {
+absl::Status SharedStore::ForEachRecord(const StoredHullVisitor& visit_hull,
+                                        const StoredBodyVisitor&) {
   std::string last;
   while (true) {
     Scheduler::Current().Note("database: reads the next hull");
     const auto next = database_.hulls_.upper_bound(last);
     if (next == database_.hulls_.end()) return absl::OkStatus();
     last = next->first;
-    visit(last, next->second.stored);
+    visit_hull(last, next->second.stored);
   }
 }
 

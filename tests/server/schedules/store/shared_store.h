@@ -26,9 +26,9 @@ class SharedStore : public Store, public PeerFeed {
   bool keeps_hulls() const override { return true; }
   PeerFeed* peers() override { return this; }
   uint64_t revision() const override { return known_.revision; }
-  absl::Status ForEachHull(const StoredHullVisitor& visit) override;
   // Without record lookup no bodies exist.
-  absl::Status ForEachBody(const StoredBodyVisitor&) override { return absl::OkStatus(); }
+  absl::Status ForEachRecord(const StoredHullVisitor& visit_hull,
+                             const StoredBodyVisitor&) override;
   absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull& hull) override;
   absl::StatusOr<uint64_t> LoadSequence(const HullRecord& hull,
                                         const std::string& writer_id) override;

@@ -11,13 +11,10 @@ absl::Status Killed() { return absl::UnavailableError("the process was killed");
 
 }  // namespace
 
-absl::Status SimulatedStore::ForEachHull(const StoredHullVisitor& visit) {
-  for (const auto& [id, kept] : hulls_) visit(id, kept.stored);
-  return absl::OkStatus();
-}
-
-absl::Status SimulatedStore::ForEachBody(const StoredBodyVisitor& visit) {
-  for (const auto& [id, body] : bodies_) visit(id, body);
+absl::Status SimulatedStore::ForEachRecord(const StoredHullVisitor& visit_hull,
+                                           const StoredBodyVisitor& visit_body) {
+  for (const auto& [id, kept] : hulls_) visit_hull(id, kept.stored);
+  for (const auto& [id, body] : bodies_) visit_body(id, body);
   return absl::OkStatus();
 }
 

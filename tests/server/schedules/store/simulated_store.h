@@ -63,8 +63,8 @@ class SimulatedStore : public Store {
   Durability durability() const override { return Durability::kSync; }
   bool keeps_hulls() const override { return true; }
   uint64_t revision() const override { return ledger_.revision(); }
-  absl::Status ForEachHull(const StoredHullVisitor& visit) override;
-  absl::Status ForEachBody(const StoredBodyVisitor& visit) override;
+  absl::Status ForEachRecord(const StoredHullVisitor& visit_hull,
+                             const StoredBodyVisitor& visit_body) override;
   absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull& hull) override;
   absl::StatusOr<uint64_t> LoadSequence(const HullRecord& hull,
                                         const std::string& writer_id) override;

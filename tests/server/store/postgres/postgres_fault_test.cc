@@ -95,9 +95,11 @@ TEST_F(PostgresFault, WritersDoNotNoticeARestartOfTheDatabase) {
   ASSERT_TRUE(hulls_->Put("cold", SpherePoints(100)).ok());
   StoredHull cold;
   ASSERT_TRUE(hulls_->store()
-                  .ForEachHull([&](const std::string& id, const absl::StatusOr<StoredHull>& hull) {
-                    if (id == "cold") cold = *hull;
-                  })
+                  .ForEachRecord(
+                      [&](const std::string& id, const absl::StatusOr<StoredHull>& hull) {
+                        if (id == "cold") cold = *hull;
+                      },
+                      [](const auto&...) {})
                   .ok());
   for (int round = 0; round < 2; ++round) {
     if (round == 0) {

@@ -294,15 +294,11 @@ void PostgresRecords::StartOverMany(bool bodies) {
   const Clock::time_point all_start = Clock::now();
   std::map<std::string, StoredHull> all_hulls;
   std::map<std::string, StoredBody> all_bodies;
-  const absl::Status read = bodies
-                                ? hulls_->store().ForEachBody(
-                                      [&](const std::string& id, absl::StatusOr<StoredBody> body) {
-                                        all_bodies.emplace(id, *std::move(body));
-                                      })
-                                : hulls_->store().ForEachHull(
-                                      [&](const std::string& id, absl::StatusOr<StoredHull> hull) {
-                                        all_hulls.emplace(id, *hull);
-                                      });
+  const absl::Status read = hulls_->store().ForEachRecord(
+      [&](const std::string& id, absl::StatusOr<StoredHull> hull) { all_hulls.emplace(id, *hull); },
+      [&](const std::string& id, absl::StatusOr<StoredBody> body) {
+        all_bodies.emplace(id, *std::move(body));
+      });
   ASSERT_TRUE(read.ok()) << read;
   EXPECT_EQ(all_hulls.size() + all_bodies.size(), count);
   if (wanted == nullptr) return;

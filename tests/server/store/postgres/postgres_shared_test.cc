@@ -63,10 +63,11 @@ class PostgresShared : public PostgresTest {
   // Returns the hull as currently stored.
   StoredHull KeptHull(const std::string& id) {
     StoredHull kept;
-    const absl::Status read =
-        hulls_->store().ForEachHull([&](const std::string& hull_id, const auto& hull) {
+    const absl::Status read = hulls_->store().ForEachRecord(
+        [&](const std::string& hull_id, const auto& hull) {
           if (hull_id == id && hull.ok()) kept = *hull;
-        });
+        },
+        [](const auto&...) {});
     EXPECT_TRUE(read.ok()) << read;
     return kept;
   }

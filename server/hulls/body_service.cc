@@ -1,5 +1,3 @@
-#include "server/bodies/body_service.h"
-
 #include <absl/strings/str_cat.h>
 
 #include <chrono>
@@ -12,11 +10,12 @@
 #include "server/call/call.h"
 #include "server/call/unary_call.h"
 #include "server/contract/errors.h"
+#include "server/hulls/hull_service.h"
 #include "server/registry/body_resolution.h"
 #include "server/registry/catalog/body.h"
 #include "server/wire/decode.h"
 #include "server/wire/encode.h"
-#include "server/wire/fresh_answer.h"
+#include "server/wire/unary_answers.h"
 
 namespace hulld::server {
 namespace {
@@ -25,7 +24,7 @@ absl::StatusOr<StoredBody> DecodeBody(const v1::PutBodyRequest& request, const C
                                       uint64_t max_pieces) {
   HULLD_RETURN_IF_ERROR(CheckHullId(caller, request.body_id(), "body_id"));
   if (request.pieces().empty()) {
-    return absl::InvalidArgumentError(
+    return InvalidArgument(
         "pieces is empty; a body needs at least one piece (use DeleteBody to remove a body)");
   }
   const auto count = static_cast<uint64_t>(request.pieces_size());
@@ -40,8 +39,8 @@ absl::StatusOr<StoredBody> DecodeBody(const v1::PutBodyRequest& request, const C
   for (int i = 0; i < request.pieces_size(); ++i) {
     const v1::Placement& piece = request.pieces(i);
     if (piece.has_points()) {
-      return absl::InvalidArgumentError(absl::StrCat(
-          "pieces[", i, "].points is set; a piece must be a registered hull; set its ID"));
+      return InvalidArgument("pieces[", i,
+                             "].points is set; a piece must be a registered hull; set its ID");
     }
     const auto [known, is_new] =
         index_of.try_emplace(piece.hull_id(), static_cast<uint32_t>(body.hull_ids.size()));
@@ -49,14 +48,14 @@ absl::StatusOr<StoredBody> DecodeBody(const v1::PutBodyRequest& request, const C
       const absl::Status valid = CheckHullId(caller, piece.hull_id(), "hull_id");
       if (!valid.ok()) return Prefixed(absl::StrCat("pieces[", i, "]."), valid);
       if (piece.hull_id() == request.body_id()) {
-        return absl::InvalidArgumentError(
-            absl::StrCat("pieces[", i, "].hull_id is the body itself; a piece must be a hull"));
+        return InvalidArgument("pieces[", i,
+                               "].hull_id is the body itself; a piece must be a hull");
       }
       body.hull_ids.push_back(piece.hull_id());
     }
     if (piece.has_end_pose()) {
-      return absl::InvalidArgumentError(absl::StrCat(
-          "pieces[", i, "].end_pose is set; a piece cannot move relative to its body"));
+      return InvalidArgument("pieces[", i,
+                             "].end_pose is set; a piece cannot move relative to its body");
     }
     const Pose pose = ReadPose(piece.pose());
     const absl::Status posed = ValidatePose(pose);
@@ -76,7 +75,7 @@ void EncodeBody(const HullChange& body, v1::BodyInfo* message) {
   message->set_damaged(body.damaged);
 }
 
-void AddListed(const HullChange& body, v1::ListBodiesResponse& response) {
+void AddListedBody(const HullChange& body, v1::ListBodiesResponse& response) {
   EncodeBody(body, response.add_bodies());
 }
 
@@ -120,7 +119,7 @@ class BodyService : public BodyServiceOfBytes {
     return UnaryCall<v1::ListBodiesRequest, v1::ListBodiesResponse>::Start(
         context, parts_.admission, Rpc::kListBodies, request, response, [this](auto* call) {
           EndListed(parts_.registry, parts_.readers, call, Rpc::kListBodies, {.bodies = true},
-                    AddListed);
+                    AddListedBody);
         });
   }
 
@@ -164,7 +163,7 @@ class BodyService : public BodyServiceOfBytes {
         parts_.registry.records().FindBodies(std::span(&id, 1), call.should_stop());
     if (!found.status.ok()) return found.status;
     const std::shared_ptr<const Body>& body = found.bodies.front();
-    if (body == nullptr) return BodyNotFound(id);
+    if (body == nullptr) return NotFound("body", id);
     if (!body->damage().ok()) return body->damage();
     HULLD_RETURN_IF_ERROR(CheckPiecePrefix(*body, call.caller().prefix));
     EncodeHeader(parts_.store, AsOf{found.store_revision, staleness}, response->mutable_header());

@@ -1,5 +1,5 @@
-#ifndef HULLD_TESTS_SERVER_BODIES_BODY_FIXTURE_H_
-#define HULLD_TESTS_SERVER_BODIES_BODY_FIXTURE_H_
+#ifndef HULLD_TESTS_SERVER_HULLS_BODY_FIXTURE_H_
+#define HULLD_TESTS_SERVER_HULLS_BODY_FIXTURE_H_
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -60,4 +60,4 @@ class BodyTest : public ServerTest {
 
 }  // namespace hulld::server
 
-#endif  // HULLD_TESTS_SERVER_BODIES_BODY_FIXTURE_H_
+#endif  // HULLD_TESTS_SERVER_HULLS_BODY_FIXTURE_H_

@@ -1,5 +1,5 @@
-#ifndef HULLD_SERVER_WIRE_FRESH_ANSWER_H_
-#define HULLD_SERVER_WIRE_FRESH_ANSWER_H_
+#ifndef HULLD_SERVER_WIRE_UNARY_ANSWERS_H_
+#define HULLD_SERVER_WIRE_UNARY_ANSWERS_H_
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
@@ -20,7 +20,6 @@
 #include "server/store/store.h"
 #include "server/wire/decode.h"
 #include "server/wire/encode.h"
-#include "server/wire/page_token.h"
 
 namespace hulld::server {
 
@@ -43,6 +42,15 @@ void EndFresh(Registry& registry, TaskPool& pool, UnaryCall* call, Answer answer
     return staleness.ok() ? answer(*staleness) : staleness.status();
   });
 }
+
+// Returns the opaque token of the page that starts after `last_id`, in this RPC's list of the IDs
+// with `prefix`.
+std::string EncodePageToken(Rpc rpc, const std::string& prefix, const std::string& last_id);
+
+// Returns the last_id of a token of the same RPC and prefix; the empty string for an empty token.
+// INVALID_ARGUMENT: the token is malformed, or belongs to another RPC or prefix.
+absl::StatusOr<std::string> DecodePageToken(Rpc rpc, const std::string& token,
+                                            const std::string& prefix);
 
 // Like EndFresh, for a call that lists records of these kinds. add: adds an entry to the reply.
 template <typename UnaryCall, typename AddEntry>
@@ -89,4 +97,4 @@ void EndDeleted(Registry& registry, UnaryCall* call, const char* kind, const std
 
 }  // namespace hulld::server
 
-#endif  // HULLD_SERVER_WIRE_FRESH_ANSWER_H_
+#endif  // HULLD_SERVER_WIRE_UNARY_ANSWERS_H_

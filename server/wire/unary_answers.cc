@@ -1,13 +1,13 @@
-#include "server/wire/page_token.h"
+#include "server/wire/unary_answers.h"
 
 #include <absl/status/status.h>
 #include <absl/strings/escaping.h>
-#include <absl/strings/str_cat.h>
 #include <absl/strings/str_split.h>
 
 #include <vector>
 
-#include "server/contract/hull_id.h"
+#include "server/access/caller.h"
+#include "server/contract/errors.h"
 
 namespace hulld::server {
 namespace {
@@ -25,19 +25,18 @@ std::string EncodePageToken(Rpc rpc, const std::string& prefix, const std::strin
 absl::StatusOr<std::string> DecodePageToken(Rpc rpc, const std::string& token,
                                             const std::string& prefix) {
   if (token.empty()) return std::string();
-  const absl::Status malformed = absl::InvalidArgumentError(
+  const absl::Status malformed = InvalidArgument(
       "page_token is malformed; use next_page_token of the previous page, or leave it empty");
   std::string plain;
   if (!absl::WebSafeBase64Unescape(token, &plain)) return malformed;
   const std::vector<std::string> parts = absl::StrSplit(plain, kSeparator);
   if (parts.size() != 3) return malformed;
   if (parts[0] != RpcName(rpc)) {
-    return absl::InvalidArgumentError(absl::StrCat("page_token belongs to a call other than ",
-                                                   RpcName(rpc),
-                                                   "; use the call of the first page"));
+    return InvalidArgument("page_token belongs to a call other than ", RpcName(rpc),
+                           "; use the call of the first page");
   }
   if (parts[1] != prefix) {
-    return absl::InvalidArgumentError(
+    return InvalidArgument(
         "page_token belongs to another prefix; use the prefix of the first page");
   }
   const std::string& last_id = parts[2];

@@ -1,8 +1,9 @@
-// Revisions of changes.
+#include "server/store/store.h"
+
 #include <unordered_map>
 
 #include "core/base/check.h"
-#include "server/store/store.h"
+#include "core/base/status_macros.h"
 
 namespace hulld::server {
 namespace {
@@ -45,6 +46,24 @@ uint64_t NumberChanges(std::span<Change* const> changes, uint64_t revision) {
     }
   }
   return revision;
+}
+
+// Reads hulls and bodies separately: a damaged store may contain both under one ID.
+absl::Status Store::ForEachRecord(const StoredHullVisitor& visit_hull,
+                                  const StoredBodyVisitor& visit_body) {
+  // About 100 bytes each, except bodies with many pieces.
+  constexpr size_t kRecordsPerPage = 4096;
+  for (const RecordKinds kinds : {RecordKinds{.hulls = true}, RecordKinds{.bodies = true}}) {
+    std::string last;
+    for (bool more = true; more;) {
+      HULLD_ASSIGN_OR_RETURN(const FoundRecords page,
+                             ListRecords("", last, kRecordsPerPage, kinds));
+      for (const auto& [id, hull] : page.hulls) visit_hull(last = id, hull);
+      for (const auto& [id, body] : page.bodies) visit_body(last = id, body);
+      more = page.more;
+    }
+  }
+  return absl::OkStatus();
 }
 
 }  // namespace hulld::server

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "client/verify/answer_check.h"
-#include "tests/server/bodies/body_fixture.h"
+#include "tests/server/hulls/body_fixture.h"
 
 namespace hulld::server {
 namespace body_certificates_test {

@@ -15,7 +15,7 @@
 
 #include "tests/client/collision_round.h"
 #include "tests/core/checks/point_sets.h"
-#include "tests/server/bodies/body_fixture.h"
+#include "tests/server/hulls/body_fixture.h"
 
 namespace hulld::server {
 namespace body_watch_test {

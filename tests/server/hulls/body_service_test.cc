@@ -10,7 +10,7 @@
 
 #include "server/store/rocksdb_store.h"
 #include "server/store/store_keys.h"
-#include "tests/server/bodies/body_fixture.h"
+#include "tests/server/hulls/body_fixture.h"
 
 namespace hulld::server {
 namespace body_service_test {

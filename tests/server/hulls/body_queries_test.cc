@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "tests/server/bodies/body_fixture.h"
+#include "tests/server/hulls/body_fixture.h"
 
 namespace hulld::server {
 namespace body_queries_test {

@@ -1,8 +1,9 @@
-#include "server/access/tls_identity.h"
+#include "server/access/tls.h"
 
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
 #include <absl/time/time.h>
+#include <grpc/grpc.h>
 #include <openssl/asn1.h>
 #include <openssl/bio.h>
 #include <openssl/err.h>
@@ -12,10 +13,12 @@
 
 #include <ctime>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "core/base/status_macros.h"
 #include "server/access/secret_file.h"
+#include "server/contract/errors.h"
 
 namespace hulld::server {
 namespace {
@@ -34,7 +37,7 @@ Bio Open(const std::string& text) {
 }
 
 absl::Status Problem(const char* setting, const std::string& path, const std::string& what) {
-  return absl::InvalidArgumentError(absl::StrCat(setting, " ", path, ": ", what));
+  return InvalidArgument(setting, " ", path, ": ", what);
 }
 
 // Returns all certificates of a file, at least one.
@@ -96,12 +99,12 @@ std::string SubjectOf(const X509* certificate) {
 
 absl::StatusOr<TlsIdentity> LoadTlsIdentity(const Config& config) {
   if (config.tls_cert.empty()) {
-    return absl::InvalidArgumentError(
-        absl::StrCat(config.tls_key.empty() ? "--tls-client-ca" : "--tls-key",
-                     " requires --tls-cert, the server's certificate; set all of them or none"));
+    return InvalidArgument(
+        config.tls_key.empty() ? "--tls-client-ca" : "--tls-key",
+        " requires --tls-cert, the server's certificate; set all of them or none");
   }
   if (config.tls_key.empty()) {
-    return absl::InvalidArgumentError("--tls-cert requires --tls-key, its private key; set both");
+    return InvalidArgument("--tls-cert requires --tls-key, its private key; set both");
   }
   TlsIdentity identity;
   HULLD_ASSIGN_OR_RETURN(identity.certificates, ReadSettingFile(config.tls_cert, "--tls-cert"));
@@ -147,14 +150,52 @@ std::string FirstCertificate(const std::string& certificates) {
 absl::Status CheckValidity(const TlsIdentity& identity, std::chrono::system_clock::time_point now) {
   const bool expired = now > identity.not_after;
   if (!expired && now >= identity.not_before) return absl::OkStatus();
-  return absl::InvalidArgumentError(absl::StrCat(
-      "--tls-cert: the certificate of ", identity.subject, expired ? " expired on " : " starts on ",
-      FormatTime(expired ? identity.not_after : identity.not_before),
-      "; clients will reject it; renew it"));
+  return InvalidArgument("--tls-cert: the certificate of ", identity.subject,
+                         expired ? " expired on " : " starts on ",
+                         FormatTime(expired ? identity.not_after : identity.not_before),
+                         "; clients will reject it; renew it");
 }
 
 std::string FormatTime(std::chrono::system_clock::time_point time) {
   return absl::FormatTime("%Y-%m-%dT%H:%M:%SZ", absl::FromChrono(time), absl::UTCTimeZone());
+}
+
+TlsCredentials::TlsCredentials(TlsIdentity identity) : identity_(std::move(identity)) {
+  const auto request = identity_.client_authorities.empty()
+                           ? GRPC_SSL_DONT_REQUEST_CLIENT_CERTIFICATE
+                           : GRPC_SSL_REQUEST_AND_REQUIRE_CLIENT_CERTIFICATE_AND_VERIFY;
+  credentials_ = grpc_ssl_server_credentials_create_with_options(
+      grpc_ssl_server_credentials_create_options_using_config_fetcher(request, Fetch, this));
+}
+
+TlsCredentials::~TlsCredentials() { grpc_server_credentials_release(credentials_); }
+
+void TlsCredentials::SetIdentity(TlsIdentity identity) {
+  const std::lock_guard lock(mutex_);
+  identity_ = std::move(identity);
+  fetched_ = false;
+}
+
+void TlsCredentials::SetAuthMetadataProcessor(const std::shared_ptr<grpc::AuthMetadataProcessor>&) {
+}
+
+grpc_ssl_certificate_config_reload_status TlsCredentials::Fetch(
+    void* self, grpc_ssl_server_certificate_config** config) {
+  auto* const credentials = static_cast<TlsCredentials*>(self);
+  const std::lock_guard lock(credentials->mutex_);
+  if (credentials->fetched_) return GRPC_SSL_CERTIFICATE_CONFIG_RELOAD_UNCHANGED;
+  const TlsIdentity& identity = credentials->identity_;
+  const grpc_ssl_pem_key_cert_pair pair = {identity.key.c_str(), identity.certificates.c_str()};
+  // gRPC requires authorities even if it does not request client certificates.
+  const bool has_authorities = !identity.client_authorities.empty();
+  *config = grpc_ssl_server_certificate_config_create(
+      (has_authorities ? identity.client_authorities : identity.certificates).c_str(), &pair, 1);
+  credentials->fetched_ = true;
+  return GRPC_SSL_CERTIFICATE_CONFIG_RELOAD_NEW;
+}
+
+int TlsCredentials::AddPortToServer(const std::string& address, grpc_server* server) {
+  return grpc_server_add_http2_port(server, address.c_str(), credentials_);
 }
 
 }  // namespace hulld::server
