@@ -73,8 +73,9 @@ absl::Status RegistryState::NoSuchHull(const std::string& id) const {
       v1::ERROR_REASON_HULL_NOT_FOUND, {{"hull_id", id}});
 }
 
-absl::Status RegistryState::NoSuchBody(const std::string& id) const {
-  if (!hulls.contains(id)) return BodyNotFound(id);
+absl::Status RegistryState::NoSuchBody(const std::string& id) {
+  const HullPointer hull = hulls.Find(id);
+  if (hull == nullptr || !hull->state.visible()) return BodyNotFound(id);
   return WithReason(absl::NotFoundError(absl::StrCat("\"", id, "\" is a hull, not a body")),
                     v1::ERROR_REASON_BODY_NOT_FOUND, {{"body_id", id}});
 }

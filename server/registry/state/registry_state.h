@@ -61,7 +61,7 @@ class RegistryState {
   std::shared_ptr<const Body> FindBody(const std::string& id);
   // NOT_FOUND; if the ID belongs to the other kind, the message says so.
   absl::Status NoSuchHull(const std::string& id) const;
-  absl::Status NoSuchBody(const std::string& id) const;
+  absl::Status NoSuchBody(const std::string& id);
 
   // Adds a stored hull, at rest or as damaged. Requires: the hull table has no hull with the ID.
   void AddStored(const std::string& id, const absl::StatusOr<StoredHull>& stored);
