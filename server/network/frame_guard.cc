@@ -1,6 +1,7 @@
 #include "server/network/frame_guard.h"
 
 #include <algorithm>
+#include <span>
 
 namespace hulld::server {
 namespace {
@@ -18,12 +19,22 @@ enum FrameType : uint8_t {
 constexpr uint8_t kEndStream = 0x1;
 constexpr uint8_t kPadded = 0x8;
 
+// Fields of a frame header.
+size_t LengthOf(std::span<const uint8_t> header) {
+  return size_t{header[0]} << 16 | size_t{header[1]} << 8 | header[2];
+}
+
+uint32_t StreamOf(std::span<const uint8_t> header) {
+  return uint32_t{header[5] & 0x7fu} << 24 | uint32_t{header[6]} << 16 | uint32_t{header[7]} << 8 |
+         header[8];
+}
+
 }  // namespace
 
 const char* FrameGuard::Name(Verdict verdict) {
   static constexpr std::array<const char*, kVerdictCount> kNames = {
-      "allowed",       "not_http2",      "header_block",
-      "large_headers", "control_frames", "half_open_streams"};
+      "allowed",        "not_http2",         "header_block", "large_headers",
+      "control_frames", "half_open_streams", "open_streams", "window_updates"};
   return kNames[static_cast<size_t>(verdict)];
 }
 
@@ -34,7 +45,8 @@ FrameGuard::FrameGuard(const FrameLimits& limits, std::atomic<size_t>& all_half_
       preface_left_(kPreface.size()),
       refilled_(now),
       control_{limits.control_frames},
-      large_headers_{limits.large_header_bytes} {}
+      large_headers_{limits.large_header_bytes},
+      window_updates_{limits.window_updates} {}
 
 FrameGuard::~FrameGuard() { all_half_open_ -= half_open_.size(); }
 
@@ -51,6 +63,8 @@ void FrameGuard::Refill(Clock::time_point now) {
   large_headers_.tokens =
       std::min(limits_.large_header_bytes,
                large_headers_.tokens + passed * limits_.large_header_bytes_per_second);
+  window_updates_.tokens = std::min(
+      limits_.window_updates, window_updates_.tokens + passed * limits_.window_updates_per_second);
 }
 
 FrameGuard::Verdict FrameGuard::Take(std::string_view bytes, Clock::time_point now) {
@@ -84,12 +98,34 @@ FrameGuard::Verdict FrameGuard::Take(std::string_view bytes, Clock::time_point n
              : Verdict::kAllowed;
 }
 
+void FrameGuard::TakeSent(std::string_view bytes) {
+  while (!bytes.empty()) {
+    size_t taken = 0;
+    if (sent_payload_left_ > 0) {
+      taken = std::min(sent_payload_left_, bytes.size());
+      sent_payload_left_ -= taken;
+    } else {
+      taken = std::min(kFrameHeaderBytes - sent_header_bytes_, bytes.size());
+      std::copy_n(bytes.begin(), taken, sent_header_.begin() + sent_header_bytes_);
+      sent_header_bytes_ += taken;
+      if (sent_header_bytes_ == kFrameHeaderBytes) {
+        sent_header_bytes_ = 0;
+        sent_payload_left_ = LengthOf(sent_header_);
+        const uint8_t type = sent_header_[3];
+        const bool ends = type == kResetStream || ((type == kData || type == kHeaders) &&
+                                                   (sent_header_[4] & kEndStream) != 0);
+        if (ends) End(StreamOf(sent_header_));
+      }
+    }
+    bytes.remove_prefix(taken);
+  }
+}
+
 FrameGuard::Verdict FrameGuard::BeginFrame() {
-  payload_left_ = size_t{header_[0]} << 16 | size_t{header_[1]} << 8 | header_[2];
+  payload_left_ = LengthOf(header_);
   data_stream_ = 0;
   const uint8_t flags = header_[4];
-  const uint32_t stream = uint32_t{header_[5] & 0x7fu} << 24 | uint32_t{header_[6]} << 16 |
-                          uint32_t{header_[7]} << 8 | header_[8];
+  const uint32_t stream = StreamOf(header_);
   switch (header_[3]) {
     case kData:
       return BeginData(stream, flags);
@@ -101,10 +137,10 @@ FrameGuard::Verdict FrameGuard::BeginFrame() {
       return CountControlFrame();
     case kResetStream:
       if (const auto found = Find(stream); found != half_open_.end()) Close(found);
+      End(stream);
       return CountControlFrame();
     case kWindowUpdate:
-      // Clients send one WINDOW_UPDATE for every few KiB that they read.
-      return Verdict::kAllowed;
+      return window_updates_.Take(1) ? Verdict::kAllowed : Verdict::kWindowUpdates;
     default:
       return CountControlFrame();
   }
@@ -118,6 +154,8 @@ FrameGuard::Verdict FrameGuard::BeginHeaders(uint32_t stream, bool ends) {
     return CountControlFrame();
   }
   last_stream_ = stream;
+  if (open_.size() >= limits_.open_streams) return Verdict::kOpenStreams;
+  open_.push_back(stream);
   if (ends) return Verdict::kAllowed;
   if (half_open_.size() >= limits_.half_open_streams) return Verdict::kHalfOpenStreams;
   half_open_.push_back({.stream = stream});
@@ -180,6 +218,13 @@ void FrameGuard::Close(std::vector<HalfOpen>::iterator stream) {
   *stream = half_open_.back();
   half_open_.pop_back();
   --all_half_open_;
+}
+
+void FrameGuard::End(uint32_t stream) {
+  const auto found = std::find(open_.begin(), open_.end(), stream);
+  if (found == open_.end()) return;
+  *found = open_.back();
+  open_.pop_back();
 }
 
 }  // namespace hulld::server

@@ -94,6 +94,20 @@ const std::vector<Attack>& Attacks() {
          return Open(2 * i + 1) + FrameBytes(Frame::kResetStream, 0, 2 * i + 1, BigEndian(8));
        }},
       {"HalfOpenStreams", 1'000, [](uint32_t i) { return Open(2 * i + 1); }},
+      // One call for each stream, without waiting for any answer.
+      {"OpenStreams", 20'000,
+       [](uint32_t i) {
+         return FrameBytes(Frame::kHeaders, kEndHeadersFlag | kEndStreamFlag, 2 * i + 1,
+                           HeaderBlock(kCheckHealth));
+       }},
+      {"WindowUpdates", 2'000,
+       [](uint32_t) {
+         std::string frames;
+         for (int i = 0; i < 100; ++i) {
+           frames += FrameBytes(Frame::kWindowUpdate, 0, 0, BigEndian(1));
+         }
+         return frames;
+       }},
       {"Continuations", 2'000,
        [](uint32_t i) {
          return FrameBytes(i == 0 ? Frame::kHeaders : Frame::kContinuation, 0, 1,

@@ -77,6 +77,54 @@ TEST_F(FrameGuardTest, HalfOpenStreamsAreBoundedByConnectionAndInTotal) {
   EXPECT_EQ(other.Take(Open(3), now_), Verdict::kHalfOpenStreams);
 }
 
+// gRPC creates any number of streams that end with their headers, although it has announced a
+// limit.
+TEST_F(FrameGuardTest, StreamsAreOpenUntilTheServerEndsThem) {
+  const auto call = [](uint32_t stream) {
+    return FrameBytes(Frame::kHeaders, kEndHeadersFlag | kEndStreamFlag, stream,
+                      HeaderBlock("/a/b"));
+  };
+  const auto message = [](uint32_t stream) {
+    return FrameBytes(Frame::kHeaders, kEndHeadersFlag, stream, "headers") +
+           FrameBytes(Frame::kData, 0, stream, MessageBytes(std::string(1000, 'm')));
+  };
+  const auto end = [](uint32_t stream) {
+    return FrameBytes(Frame::kHeaders, kEndHeadersFlag | kEndStreamFlag, stream, "trailers");
+  };
+  ASSERT_EQ(Send(kOpening), Verdict::kAllowed);
+  guard_.TakeSent(FrameBytes(Frame::kSettings, 0, 0, std::string(6, '\0')));
+  uint32_t stream = 1;
+  for (int i = 0; i < 256; ++i, stream += 2) ASSERT_EQ(Send(call(stream)), Verdict::kAllowed);
+  EXPECT_EQ(guard_.open_streams(), 256);
+  // Replies written in pieces of any size end their streams.
+  for (const size_t piece : {size_t{1}, size_t{7}, size_t{5000}}) {
+    const uint32_t first = stream - 2 * 256;
+    const std::string replies = message(first) + end(first) + message(first + 2) +
+                                FrameBytes(Frame::kResetStream, 0, first + 2, BigEndian(0)) +
+                                message(first + 4);
+    for (size_t at = 0; at < replies.size(); at += piece) {
+      guard_.TakeSent(replies.substr(at, piece));
+    }
+    EXPECT_EQ(guard_.open_streams(), 254);
+    // A stream ends once.
+    guard_.TakeSent(end(first) + FrameBytes(Frame::kResetStream, 0, first, BigEndian(0)));
+    EXPECT_EQ(guard_.open_streams(), 254);
+    for (int i = 0; i < 2; ++i, stream += 2) ASSERT_EQ(Send(call(stream)), Verdict::kAllowed);
+  }
+  ASSERT_EQ(Send(Reset(stream - 2) + call(stream)), Verdict::kAllowed);
+  EXPECT_EQ(guard_.open_streams(), 256);
+  EXPECT_EQ(Send(call(stream + 2)), Verdict::kOpenStreams);
+}
+
+TEST_F(FrameGuardTest, TheRateOfWindowUpdatesIsBounded) {
+  ASSERT_EQ(Send(kOpening), Verdict::kAllowed);
+  const std::string update = FrameBytes(Frame::kWindowUpdate, 0, 0, BigEndian(1));
+  for (int i = 0; i < 50'000; ++i) ASSERT_EQ(Send(update), Verdict::kAllowed);
+  now_ += std::chrono::milliseconds(100);
+  for (int i = 0; i < 5'000; ++i) ASSERT_EQ(Send(update), Verdict::kAllowed);
+  EXPECT_EQ(Send(update), Verdict::kWindowUpdates);
+}
+
 TEST_F(FrameGuardTest, ADestroyedGuardReleasesItsHalfOpenStreams) {
   {
     FrameGuard other(FrameLimits{}, all_half_open_, now_);
