@@ -38,15 +38,34 @@ const char* FrameGuard::Name(Verdict verdict) {
   return kNames[static_cast<size_t>(verdict)];
 }
 
+double BurstShares::Draw(const Network& network, Clock::time_point now) {
+  // An account that would be full again is not needed. If none is, forgets all: an attacker with so
+  // many networks gains nothing from full bursts.
+  if (accounts_.size() >= kMaxNetworks && !accounts_.contains(network)) {
+    std::erase_if(accounts_, [now](const auto& account) {
+      return now - account.second.drawn > std::chrono::duration<double>(kFull / kFullPerSecond);
+    });
+    if (accounts_.size() >= kMaxNetworks) accounts_.clear();
+  }
+  Account& account = accounts_.try_emplace(network, Account{kFull, now}).first->second;
+  const double passed = std::chrono::duration<double>(now - account.drawn).count();
+  account.drawn = now;
+  account.left = std::min(kFull, account.left + passed * kFullPerSecond);
+  const double share = std::clamp(account.left, kLeast, 1.0);
+  account.left = std::max(0.0, account.left - share);
+  return share;
+}
+
 FrameGuard::FrameGuard(const FrameLimits& limits, std::atomic<size_t>& all_half_open,
                        Clock::time_point now)
     : limits_(limits),
       all_half_open_(all_half_open),
       preface_left_(kPreface.size()),
       refilled_(now),
-      control_{limits.control_frames},
-      large_headers_{limits.large_header_bytes},
-      window_updates_{limits.window_updates} {}
+      control_{limits.control_frames * limits.first_share},
+      resets_{limits.resets * limits.first_share},
+      large_headers_{limits.large_header_bytes * limits.first_share},
+      window_updates_{limits.window_updates * limits.first_share} {}
 
 FrameGuard::~FrameGuard() { all_half_open_ -= half_open_.size(); }
 
@@ -60,6 +79,7 @@ void FrameGuard::Refill(Clock::time_point now) {
   refilled_ = now;
   control_.tokens = std::min(limits_.control_frames,
                              control_.tokens + passed * limits_.control_frames_per_second);
+  resets_.tokens = std::min(limits_.resets, resets_.tokens + passed * limits_.resets_per_second);
   large_headers_.tokens =
       std::min(limits_.large_header_bytes,
                large_headers_.tokens + passed * limits_.large_header_bytes_per_second);
@@ -138,7 +158,7 @@ FrameGuard::Verdict FrameGuard::BeginFrame() {
     case kResetStream:
       if (const auto found = Find(stream); found != half_open_.end()) Close(found);
       End(stream);
-      return CountControlFrame();
+      return resets_.Take(1) ? CountControlFrame() : Verdict::kControlFrames;
     case kWindowUpdate:
       return window_updates_.Take(1) ? Verdict::kAllowed : Verdict::kWindowUpdates;
     default:

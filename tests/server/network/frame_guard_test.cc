@@ -125,6 +125,49 @@ TEST_F(FrameGuardTest, TheRateOfWindowUpdatesIsBounded) {
   EXPECT_EQ(Send(update), Verdict::kWindowUpdates);
 }
 
+TEST_F(FrameGuardTest, AShareOfTheBurstsGrowsToAllOfThem) {
+  FrameLimits limits;
+  limits.first_share = 0.05;
+  FrameGuard guard(limits, all_half_open_, now_);
+  ASSERT_EQ(guard.Take(kOpening, now_), Verdict::kAllowed);
+  const std::string ping = FrameBytes(Frame::kPing, 0, 0, "12345678");
+  for (int i = 0; i < 49; ++i) ASSERT_EQ(guard.Take(ping, now_), Verdict::kAllowed);
+  now_ += std::chrono::seconds(60);
+  for (int i = 0; i < 1000; ++i) ASSERT_EQ(guard.Take(ping, now_), Verdict::kAllowed);
+  EXPECT_EQ(guard.Take(ping, now_), Verdict::kControlFrames);
+}
+
+TEST_F(FrameGuardTest, TheRateOfResetsIsBounded) {
+  ASSERT_EQ(Send(kOpening), Verdict::kAllowed);
+  uint32_t stream = 1;
+  const auto open_and_reset = [&] {
+    stream += 2;
+    return Send(Open(stream) + Reset(stream));
+  };
+  for (int i = 0; i < 256; ++i) ASSERT_EQ(open_and_reset(), Verdict::kAllowed);
+  now_ += std::chrono::seconds(1);
+  for (int i = 0; i < 200; ++i) ASSERT_EQ(open_and_reset(), Verdict::kAllowed);
+  EXPECT_EQ(open_and_reset(), Verdict::kControlFrames);
+}
+
+// Rapid reset on one connection after another.
+TEST(BurstShares, ANetworkThatReconnectsBeginsWithSmallBursts) {
+  const BurstShares::Network network = {1};
+  FrameGuard::Clock::time_point now{};
+  BurstShares shares;
+  for (int i = 0; i < 8; ++i) EXPECT_EQ(shares.Draw(network, now), 1);
+  for (int i = 0; i < 100; ++i) EXPECT_EQ(shares.Draw(network, now), 0.05);
+  EXPECT_EQ(shares.Draw({2}, now), 1);
+  now += std::chrono::seconds(2);
+  for (int i = 0; i < 2; ++i) EXPECT_EQ(shares.Draw(network, now), 1);
+  EXPECT_EQ(shares.Draw(network, now), 0.05);
+  // Many other networks neither use up memory nor the bursts of new ones.
+  for (uint32_t i = 0; i < 10'000; ++i) {
+    const auto byte = [i](int shift) { return static_cast<uint8_t>(i >> shift); };
+    EXPECT_EQ(shares.Draw({3, byte(0), byte(8), byte(16)}, now), 1);
+  }
+}
+
 TEST_F(FrameGuardTest, ADestroyedGuardReleasesItsHalfOpenStreams) {
   {
     FrameGuard other(FrameLimits{}, all_half_open_, now_);
@@ -157,9 +200,9 @@ TEST_F(FrameGuardTest, TheRateOfLargeHeaderBlocksIsBounded) {
 
 TEST_F(FrameGuardTest, TheRateOfControlFramesIsBounded) {
   for (const std::string& frame :
-       {Reset(1), FrameBytes(Frame::kPing, 0, 0, "12345678"),
-        FrameBytes(Frame::kSettings, 0, 0, ""), FrameBytes(Frame::kContinuation, 0, 1, ""),
-        FrameBytes(Frame::kData, 0, 1, ""), FrameBytes(Frame{200}, 0, 0, "x"),
+       {FrameBytes(Frame::kPing, 0, 0, "12345678"), FrameBytes(Frame::kSettings, 0, 0, ""),
+        FrameBytes(Frame::kContinuation, 0, 1, ""), FrameBytes(Frame::kData, 0, 1, ""),
+        FrameBytes(Frame{200}, 0, 0, "x"),
         // Trailers.
         FrameBytes(Frame::kHeaders, kEndHeadersFlag, 1, "")}) {
     auto now = now_;
