@@ -56,7 +56,7 @@ double BurstShares::Draw(const Network& network, Clock::time_point now) {
   return share;
 }
 
-FrameGuard::FrameGuard(const FrameLimits& limits, std::atomic<size_t>& all_half_open,
+FrameGuard::FrameGuard(const FrameLimits& limits, HalfOpenTotals& all_half_open,
                        Clock::time_point now)
     : limits_(limits),
       all_half_open_(all_half_open),
@@ -67,7 +67,10 @@ FrameGuard::FrameGuard(const FrameLimits& limits, std::atomic<size_t>& all_half_
       large_headers_{limits.large_header_bytes * limits.first_share},
       window_updates_{limits.window_updates * limits.first_share} {}
 
-FrameGuard::~FrameGuard() { all_half_open_ -= half_open_.size(); }
+FrameGuard::~FrameGuard() {
+  all_half_open_.streams -= half_open_.size();
+  all_half_open_.bytes -= half_open_bytes_;
+}
 
 bool FrameGuard::Bucket::Take(double count) {
   tokens -= count;
@@ -113,9 +116,11 @@ FrameGuard::Verdict FrameGuard::Take(std::string_view bytes, Clock::time_point n
   }
   // Checked per read rather than per frame: a client writes headers and message together, so a
   // connection that leaves streams half-open between two reads is unusual.
-  return !half_open_.empty() && all_half_open_ > limits_.all_half_open_streams
-             ? Verdict::kHalfOpenStreams
-             : Verdict::kAllowed;
+  const bool too_many =
+      !half_open_.empty() && all_half_open_.streams > limits_.all_half_open_streams;
+  const bool too_large = half_open_bytes_ > limits_.half_open_bytes &&
+                         all_half_open_.bytes > limits_.all_half_open_bytes;
+  return too_many || too_large ? Verdict::kHalfOpenStreams : Verdict::kAllowed;
 }
 
 void FrameGuard::TakeSent(std::string_view bytes) {
@@ -158,7 +163,7 @@ FrameGuard::Verdict FrameGuard::BeginFrame() {
     case kResetStream:
       if (const auto found = Find(stream); found != half_open_.end()) Close(found);
       End(stream);
-      return resets_.Take(1) ? CountControlFrame() : Verdict::kControlFrames;
+      return resets_.Take(1) ? Verdict::kAllowed : Verdict::kControlFrames;
     case kWindowUpdate:
       return window_updates_.Take(1) ? Verdict::kAllowed : Verdict::kWindowUpdates;
     default:
@@ -179,7 +184,7 @@ FrameGuard::Verdict FrameGuard::BeginHeaders(uint32_t stream, bool ends) {
   if (ends) return Verdict::kAllowed;
   if (half_open_.size() >= limits_.half_open_streams) return Verdict::kHalfOpenStreams;
   half_open_.push_back({.stream = stream});
-  ++all_half_open_;
+  ++all_half_open_.streams;
   return Verdict::kAllowed;
 }
 
@@ -194,7 +199,10 @@ FrameGuard::Verdict FrameGuard::BeginData(uint32_t stream, uint8_t flags) {
       data_stream_ = stream;
     }
   }
-  return is_padded || (payload_left_ == 0 && !ends) ? CountControlFrame() : Verdict::kAllowed;
+  // gRPC reads DATA of ended and unknown streams faster than it returns to other connections.
+  const bool is_open = std::find(open_.begin(), open_.end(), stream) != open_.end();
+  return is_padded || !is_open || (payload_left_ == 0 && !ends) ? CountControlFrame()
+                                                                : Verdict::kAllowed;
 }
 
 void FrameGuard::TakeData(std::string_view bytes) {
@@ -210,7 +218,11 @@ void FrameGuard::TakeData(std::string_view bytes) {
     if (--message.prefix_left == 0) message.left = message.length;
   }
   if (message.prefix_left > 0) return;
-  message.left -= std::min<uint64_t>(message.left, bytes.size());
+  const size_t received = std::min<uint64_t>(message.left, bytes.size());
+  message.left -= received;
+  message.received += received;
+  half_open_bytes_ += received;
+  all_half_open_.bytes += received;
   if (message.left == 0) Close(found);
 }
 
@@ -235,9 +247,11 @@ std::vector<FrameGuard::HalfOpen>::iterator FrameGuard::Find(uint32_t stream) {
 }
 
 void FrameGuard::Close(std::vector<HalfOpen>::iterator stream) {
+  half_open_bytes_ -= stream->received;
+  all_half_open_.bytes -= stream->received;
   *stream = half_open_.back();
   half_open_.pop_back();
-  --all_half_open_;
+  --all_half_open_.streams;
 }
 
 void FrameGuard::End(uint32_t stream) {

@@ -18,10 +18,10 @@ struct FrameLimits {
   // KiB, but parses any number of bytes first.
   size_t header_block_bytes = 16 << 10;
   // RST_STREAM frames. Each costs gRPC 100 to 200 us (**observed**). The burst covers a client that
-  // cancels all of its calls.
+  // cancels all of its calls; the rate, one whose calls exceed short deadlines.
   double resets = 256;
-  double resets_per_second = 200;
-  // Frames without a request that gRPC answers or allocates memory for: RST_STREAM, PING, SETTINGS,
+  double resets_per_second = 500;
+  // Other frames without a request that gRPC answers or allocates memory for: PING, SETTINGS,
   // PRIORITY, GOAWAY, CONTINUATION, trailers, empty or padded DATA, unknown types.
   double control_frames = 1000;
   double control_frames_per_second = 200;
@@ -34,6 +34,11 @@ struct FrameLimits {
   // server.
   size_t half_open_streams = 100;
   size_t all_half_open_streams = 4096;
+  // Bytes received of incomplete first messages of all connections. Above this, a connection with
+  // more than half_open_bytes of them is closed. gRPC has a quota of its own, but may crash when
+  // it is exhausted: its reclaimer then runs on a thread that has no gRPC context (**observed**).
+  size_t all_half_open_bytes = 96 << 20;
+  size_t half_open_bytes = 1 << 20;
   // Streams of a connection that the server has not ended. gRPC announces a limit of 100
   // concurrent streams, but does not enforce it before the client acknowledges it, and then too
   // late: it creates any number of streams first, each of 12 KB, and other connections wait for all
@@ -44,6 +49,12 @@ struct FrameLimits {
   // WINDOW_UPDATE frames. gRPC clients send two for every 16 KiB or more that they read.
   double window_updates = 50'000;
   double window_updates_per_second = 50'000;
+};
+
+// Totals of all guards.
+struct HalfOpenTotals {
+  std::atomic<size_t> streams = 0;
+  std::atomic<size_t> bytes = 0;
 };
 
 // Limits the bursts of clients that reconnect. A network's first connections begin with full
@@ -93,8 +104,8 @@ class FrameGuard {
   // Name in the metric: "header_block".
   static const char* Name(Verdict verdict);
 
-  // all_half_open: total of all guards; must outlive this.
-  FrameGuard(const FrameLimits& limits, std::atomic<size_t>& all_half_open, Clock::time_point now);
+  // all_half_open: must outlive this.
+  FrameGuard(const FrameLimits& limits, HalfOpenTotals& all_half_open, Clock::time_point now);
   FrameGuard(const FrameGuard&) = delete;
   FrameGuard& operator=(const FrameGuard&) = delete;
   ~FrameGuard();
@@ -120,6 +131,7 @@ class FrameGuard {
     // Bytes until the message is complete, including missing bytes of its 5-byte prefix.
     uint64_t left = kPrefixBytes;
     uint32_t length = 0;
+    size_t received = 0;
     int prefix_left = kPrefixBytes;
   };
   static constexpr int kPrefixBytes = 5;
@@ -139,7 +151,9 @@ class FrameGuard {
   void Refill(Clock::time_point now);
 
   const FrameLimits limits_;
-  std::atomic<size_t>& all_half_open_;
+  HalfOpenTotals& all_half_open_;
+  // Bytes of half_open_.
+  size_t half_open_bytes_ = 0;
   size_t preface_left_;
   std::array<uint8_t, kFrameHeaderBytes> header_{};
   size_t header_bytes_ = 0;

@@ -37,7 +37,7 @@ struct Slot {
 };
 
 std::array<std::atomic<Slot*>, kMaxGuardedDescriptors> slots;
-std::atomic<size_t> half_open_streams = 0;
+HalfOpenTotals half_open;
 std::array<std::atomic<uint64_t>, FrameGuard::kVerdictCount> closed;
 
 Slot* SlotOf(int descriptor) {
@@ -94,7 +94,7 @@ void GuardSocket(int descriptor, uint64_t connection, const FrameLimits* limits,
   }
   const std::lock_guard lock(slot->mutex);
   slot->Clear();
-  if (limits != nullptr) slot->guard.emplace(*limits, half_open_streams, FrameGuard::Clock::now());
+  if (limits != nullptr) slot->guard.emplace(*limits, half_open, FrameGuard::Clock::now());
   slot->on_closed = std::move(on_closed);
   slot->connection = connection;
 }
@@ -119,7 +119,7 @@ std::array<uint64_t, FrameGuard::kVerdictCount> ClosedByGuard() {
   return counts;
 }
 
-size_t HalfOpenStreams() { return half_open_streams; }
+size_t HalfOpenStreams() { return half_open.streams; }
 
 }  // namespace hulld::server
 

@@ -24,7 +24,7 @@ class FrameGuardTest : public testing::Test {
   }
 
   FrameGuard::Clock::time_point now_{};
-  std::atomic<size_t> all_half_open_ = 0;
+  HalfOpenTotals all_half_open_;
   FrameGuard guard_{FrameLimits{}, all_half_open_, now_};
 };
 
@@ -41,7 +41,7 @@ TEST_F(FrameGuardTest, OrdinaryCallsPassInPiecesOfAnySize) {
     }
     EXPECT_EQ(guard.half_open_streams(), 0);
   }
-  EXPECT_EQ(all_half_open_, 0);
+  EXPECT_EQ(all_half_open_.streams, 0);
 }
 
 TEST_F(FrameGuardTest, RefusesConnectionsThatAreNotHttp2) {
@@ -61,14 +61,14 @@ TEST_F(FrameGuardTest, AStreamIsHalfOpenUntilItsFirstMessageIsComplete) {
             Verdict::kAllowed);
   EXPECT_EQ(guard_.half_open_streams(), 0);
   ASSERT_EQ(Send(Open(7) + FrameBytes(Frame::kData, 0, 7, MessageBytes(""))), Verdict::kAllowed);
-  EXPECT_EQ(all_half_open_, 0);
+  EXPECT_EQ(all_half_open_.streams, 0);
 }
 
 TEST_F(FrameGuardTest, HalfOpenStreamsAreBoundedByConnectionAndInTotal) {
   ASSERT_EQ(Send(kOpening), Verdict::kAllowed);
   for (uint32_t i = 0; i < 100; ++i) ASSERT_EQ(Send(Open(2 * i + 1)), Verdict::kAllowed);
   EXPECT_EQ(Send(Open(201)), Verdict::kHalfOpenStreams);
-  all_half_open_ = 4096;
+  all_half_open_.streams = 4096;
   FrameGuard other(FrameLimits{}, all_half_open_, now_);
   // Headers and message together leave nothing half-open.
   EXPECT_EQ(
@@ -146,7 +146,9 @@ TEST_F(FrameGuardTest, TheRateOfResetsIsBounded) {
   };
   for (int i = 0; i < 256; ++i) ASSERT_EQ(open_and_reset(), Verdict::kAllowed);
   now_ += std::chrono::seconds(1);
-  for (int i = 0; i < 200; ++i) ASSERT_EQ(open_and_reset(), Verdict::kAllowed);
+  for (int i = 0; i < 256; ++i) ASSERT_EQ(open_and_reset(), Verdict::kAllowed);
+  now_ += std::chrono::milliseconds(100);
+  for (int i = 0; i < 50; ++i) ASSERT_EQ(open_and_reset(), Verdict::kAllowed);
   EXPECT_EQ(open_and_reset(), Verdict::kControlFrames);
 }
 
@@ -168,13 +170,34 @@ TEST(BurstShares, ANetworkThatReconnectsBeginsWithSmallBursts) {
   }
 }
 
+// gRPC keeps incomplete messages in memory.
+TEST_F(FrameGuardTest, BytesOfIncompleteMessagesAreBounded) {
+  const auto part = [](uint32_t stream, size_t bytes) {
+    return FrameBytes(Frame::kData, 0, stream, std::string(bytes, 'm'));
+  };
+  const std::string prefix = std::string(1, '\0') + BigEndian(3 << 20);
+  ASSERT_EQ(Send(kOpening + Open(1) + FrameBytes(Frame::kData, 0, 1, prefix)), Verdict::kAllowed);
+  ASSERT_EQ(Send(part(1, 2 << 20)), Verdict::kAllowed);
+  EXPECT_EQ(all_half_open_.bytes, 2 << 20);
+  all_half_open_.bytes += 96 << 20;
+  FrameGuard other(FrameLimits{}, all_half_open_, now_);
+  EXPECT_EQ(
+      other.Take(kOpening + Open(1) + FrameBytes(Frame::kData, 0, 1, prefix) + part(1, 1000), now_),
+      Verdict::kAllowed);
+  EXPECT_EQ(Send(part(1, 1)), Verdict::kHalfOpenStreams);
+  // A complete message no longer counts.
+  all_half_open_.bytes -= 96 << 20;
+  ASSERT_EQ(Send(part(1, (1 << 20) - 1)), Verdict::kAllowed);
+  EXPECT_EQ(all_half_open_.bytes, 1000);
+}
+
 TEST_F(FrameGuardTest, ADestroyedGuardReleasesItsHalfOpenStreams) {
   {
     FrameGuard other(FrameLimits{}, all_half_open_, now_);
     ASSERT_EQ(other.Take(kOpening + Open(1), now_), Verdict::kAllowed);
-    EXPECT_EQ(all_half_open_, 1);
+    EXPECT_EQ(all_half_open_.streams, 1);
   }
-  EXPECT_EQ(all_half_open_, 0);
+  EXPECT_EQ(all_half_open_.streams, 0);
 }
 
 TEST_F(FrameGuardTest, AHeaderBlockIsBoundedIncludingContinuations) {
