@@ -163,7 +163,7 @@ class BodyService : public BodyServiceOfBytes {
         parts_.registry.records().FindBodies(std::span(&id, 1), call.should_stop());
     if (!found.status.ok()) return found.status;
     const std::shared_ptr<const Body>& body = found.bodies.front();
-    if (body == nullptr) return NotFound("body", id);
+    if (body == nullptr) return parts_.registry.records().NoSuchBody(id);
     if (!body->damage().ok()) return body->damage();
     HULLD_RETURN_IF_ERROR(CheckPiecePrefix(*body, call.caller().prefix));
     EncodeHeader(parts_.store, AsOf{found.store_revision, staleness}, response->mutable_header());

@@ -7,6 +7,7 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include "core/base/status_macros.h"
@@ -15,6 +16,7 @@
 #include "server/call/service_parts.h"
 #include "server/contract/errors.h"
 #include "server/hulls/hull_service.h"
+#include "server/hulls/watch_event.h"
 #include "server/registry/watch/change_feed.h"
 #include "server/wire/encode.h"
 
@@ -136,7 +138,7 @@ class WatchStream : public RequestStream<PulledStream<WriteReactor, v1::WatchHul
   }
 
   // Reads the missing boxes at the current revisions of their hulls, one hull at a time to bound
-  // memory. Drops hulls that were deleted; a later batch reports the deletion.
+  // memory. Drops hulls that were deleted or replaced; a later batch reports that.
   absl::Status LoadBoxes(WatchBatch* batch) {
     std::vector<HullChange> loaded;
     loaded.reserve(batch->changes.size());
@@ -150,8 +152,10 @@ class WatchStream : public RequestStream<PulledStream<WriteReactor, v1::WatchHul
         change.damaged = !status.ok();
         if (resolved.ok()) {
           const HullView& view = resolved->second;
-          change.record = view.record;
-          change.box = view.served->box();
+          std::optional<HullChange> current =
+              AtCurrentState(std::move(change), view.record, view.served->box());
+          if (current.has_value()) loaded.push_back(*std::move(current));
+          continue;
         }
       }
       loaded.push_back(std::move(change));

@@ -282,7 +282,11 @@ void ConnectionAcceptor::Admit(Descriptor socket, const sockaddr_storage& name) 
     const std::lock_guard lock(mutex_);
     connections_.insert(id);
   }
-  GuardSocket(socket.number(), id, frames_.has_value() ? &*frames_ : nullptr,
+  std::optional<FrameLimits> frames = frames_;
+  if (frames.has_value() && peer.has_value()) {
+    frames->first_share = shares_.Draw(peer->Network(), FrameGuard::Clock::now());
+  }
+  GuardSocket(socket.number(), id, frames.has_value() ? &*frames : nullptr,
               [this, id] { OnClosed(id); });
   grpc::experimental::ExternalConnectionAcceptor::NewConnectionParameters parameters;
   parameters.fd = socket.Release();

@@ -84,6 +84,8 @@ class ConnectionAcceptor {
   Descriptor reserve_;
   std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> grpc_;
   std::optional<FrameLimits> frames_;
+  // Used by the acceptor's thread.
+  BurstShares shares_;
   // The ID of a connection is its number, followed by its descriptor, which gRPC owns.
   uint64_t last_number_ = 0;
   std::mutex mutex_;

@@ -1,6 +1,7 @@
 #include "server/network/frame_guard.h"
 
 #include <algorithm>
+#include <span>
 
 namespace hulld::server {
 namespace {
@@ -18,25 +19,58 @@ enum FrameType : uint8_t {
 constexpr uint8_t kEndStream = 0x1;
 constexpr uint8_t kPadded = 0x8;
 
+// Fields of a frame header.
+size_t LengthOf(std::span<const uint8_t> header) {
+  return size_t{header[0]} << 16 | size_t{header[1]} << 8 | header[2];
+}
+
+uint32_t StreamOf(std::span<const uint8_t> header) {
+  return uint32_t{header[5] & 0x7fu} << 24 | uint32_t{header[6]} << 16 | uint32_t{header[7]} << 8 |
+         header[8];
+}
+
 }  // namespace
 
 const char* FrameGuard::Name(Verdict verdict) {
   static constexpr std::array<const char*, kVerdictCount> kNames = {
-      "allowed",       "not_http2",      "header_block",
-      "large_headers", "control_frames", "half_open_streams"};
+      "allowed",        "not_http2",         "header_block", "large_headers",
+      "control_frames", "half_open_streams", "open_streams", "window_updates"};
   return kNames[static_cast<size_t>(verdict)];
 }
 
-FrameGuard::FrameGuard(const FrameLimits& limits, std::atomic<size_t>& all_half_open,
+double BurstShares::Draw(const Network& network, Clock::time_point now) {
+  // An account that would be full again is not needed. If none is, forgets all: an attacker with so
+  // many networks gains nothing from full bursts.
+  if (accounts_.size() >= kMaxNetworks && !accounts_.contains(network)) {
+    std::erase_if(accounts_, [now](const auto& account) {
+      return now - account.second.drawn > std::chrono::duration<double>(kFull / kFullPerSecond);
+    });
+    if (accounts_.size() >= kMaxNetworks) accounts_.clear();
+  }
+  Account& account = accounts_.try_emplace(network, Account{kFull, now}).first->second;
+  const double passed = std::chrono::duration<double>(now - account.drawn).count();
+  account.drawn = now;
+  account.left = std::min(kFull, account.left + passed * kFullPerSecond);
+  const double share = std::clamp(account.left, kLeast, 1.0);
+  account.left = std::max(0.0, account.left - share);
+  return share;
+}
+
+FrameGuard::FrameGuard(const FrameLimits& limits, HalfOpenTotals& all_half_open,
                        Clock::time_point now)
     : limits_(limits),
       all_half_open_(all_half_open),
       preface_left_(kPreface.size()),
       refilled_(now),
-      control_{limits.control_frames},
-      large_headers_{limits.large_header_bytes} {}
+      control_{limits.control_frames * limits.first_share},
+      resets_{limits.resets * limits.first_share},
+      large_headers_{limits.large_header_bytes * limits.first_share},
+      window_updates_{limits.window_updates * limits.first_share} {}
 
-FrameGuard::~FrameGuard() { all_half_open_ -= half_open_.size(); }
+FrameGuard::~FrameGuard() {
+  all_half_open_.streams -= half_open_.size();
+  all_half_open_.bytes -= half_open_bytes_;
+}
 
 bool FrameGuard::Bucket::Take(double count) {
   tokens -= count;
@@ -48,9 +82,12 @@ void FrameGuard::Refill(Clock::time_point now) {
   refilled_ = now;
   control_.tokens = std::min(limits_.control_frames,
                              control_.tokens + passed * limits_.control_frames_per_second);
+  resets_.tokens = std::min(limits_.resets, resets_.tokens + passed * limits_.resets_per_second);
   large_headers_.tokens =
       std::min(limits_.large_header_bytes,
                large_headers_.tokens + passed * limits_.large_header_bytes_per_second);
+  window_updates_.tokens = std::min(
+      limits_.window_updates, window_updates_.tokens + passed * limits_.window_updates_per_second);
 }
 
 FrameGuard::Verdict FrameGuard::Take(std::string_view bytes, Clock::time_point now) {
@@ -79,17 +116,41 @@ FrameGuard::Verdict FrameGuard::Take(std::string_view bytes, Clock::time_point n
   }
   // Checked per read rather than per frame: a client writes headers and message together, so a
   // connection that leaves streams half-open between two reads is unusual.
-  return !half_open_.empty() && all_half_open_ > limits_.all_half_open_streams
-             ? Verdict::kHalfOpenStreams
-             : Verdict::kAllowed;
+  const bool too_many =
+      !half_open_.empty() && all_half_open_.streams > limits_.all_half_open_streams;
+  const bool too_large = half_open_bytes_ > limits_.half_open_bytes &&
+                         all_half_open_.bytes > limits_.all_half_open_bytes;
+  return too_many || too_large ? Verdict::kHalfOpenStreams : Verdict::kAllowed;
+}
+
+void FrameGuard::TakeSent(std::string_view bytes) {
+  while (!bytes.empty()) {
+    size_t taken = 0;
+    if (sent_payload_left_ > 0) {
+      taken = std::min(sent_payload_left_, bytes.size());
+      sent_payload_left_ -= taken;
+    } else {
+      taken = std::min(kFrameHeaderBytes - sent_header_bytes_, bytes.size());
+      std::copy_n(bytes.begin(), taken, sent_header_.begin() + sent_header_bytes_);
+      sent_header_bytes_ += taken;
+      if (sent_header_bytes_ == kFrameHeaderBytes) {
+        sent_header_bytes_ = 0;
+        sent_payload_left_ = LengthOf(sent_header_);
+        const uint8_t type = sent_header_[3];
+        const bool ends = type == kResetStream || ((type == kData || type == kHeaders) &&
+                                                   (sent_header_[4] & kEndStream) != 0);
+        if (ends) End(StreamOf(sent_header_));
+      }
+    }
+    bytes.remove_prefix(taken);
+  }
 }
 
 FrameGuard::Verdict FrameGuard::BeginFrame() {
-  payload_left_ = size_t{header_[0]} << 16 | size_t{header_[1]} << 8 | header_[2];
+  payload_left_ = LengthOf(header_);
   data_stream_ = 0;
   const uint8_t flags = header_[4];
-  const uint32_t stream = uint32_t{header_[5] & 0x7fu} << 24 | uint32_t{header_[6]} << 16 |
-                          uint32_t{header_[7]} << 8 | header_[8];
+  const uint32_t stream = StreamOf(header_);
   switch (header_[3]) {
     case kData:
       return BeginData(stream, flags);
@@ -101,10 +162,10 @@ FrameGuard::Verdict FrameGuard::BeginFrame() {
       return CountControlFrame();
     case kResetStream:
       if (const auto found = Find(stream); found != half_open_.end()) Close(found);
-      return CountControlFrame();
+      End(stream);
+      return resets_.Take(1) ? Verdict::kAllowed : Verdict::kControlFrames;
     case kWindowUpdate:
-      // Clients send one WINDOW_UPDATE for every few KiB that they read.
-      return Verdict::kAllowed;
+      return window_updates_.Take(1) ? Verdict::kAllowed : Verdict::kWindowUpdates;
     default:
       return CountControlFrame();
   }
@@ -118,10 +179,12 @@ FrameGuard::Verdict FrameGuard::BeginHeaders(uint32_t stream, bool ends) {
     return CountControlFrame();
   }
   last_stream_ = stream;
+  if (open_.size() >= limits_.open_streams) return Verdict::kOpenStreams;
+  open_.push_back(stream);
   if (ends) return Verdict::kAllowed;
   if (half_open_.size() >= limits_.half_open_streams) return Verdict::kHalfOpenStreams;
   half_open_.push_back({.stream = stream});
-  ++all_half_open_;
+  ++all_half_open_.streams;
   return Verdict::kAllowed;
 }
 
@@ -136,7 +199,10 @@ FrameGuard::Verdict FrameGuard::BeginData(uint32_t stream, uint8_t flags) {
       data_stream_ = stream;
     }
   }
-  return is_padded || (payload_left_ == 0 && !ends) ? CountControlFrame() : Verdict::kAllowed;
+  // gRPC reads DATA of ended and unknown streams faster than it returns to other connections.
+  const bool is_open = std::find(open_.begin(), open_.end(), stream) != open_.end();
+  return is_padded || !is_open || (payload_left_ == 0 && !ends) ? CountControlFrame()
+                                                                : Verdict::kAllowed;
 }
 
 void FrameGuard::TakeData(std::string_view bytes) {
@@ -152,7 +218,11 @@ void FrameGuard::TakeData(std::string_view bytes) {
     if (--message.prefix_left == 0) message.left = message.length;
   }
   if (message.prefix_left > 0) return;
-  message.left -= std::min<uint64_t>(message.left, bytes.size());
+  const size_t received = std::min<uint64_t>(message.left, bytes.size());
+  message.left -= received;
+  message.received += received;
+  half_open_bytes_ += received;
+  all_half_open_.bytes += received;
   if (message.left == 0) Close(found);
 }
 
@@ -177,9 +247,18 @@ std::vector<FrameGuard::HalfOpen>::iterator FrameGuard::Find(uint32_t stream) {
 }
 
 void FrameGuard::Close(std::vector<HalfOpen>::iterator stream) {
+  half_open_bytes_ -= stream->received;
+  all_half_open_.bytes -= stream->received;
   *stream = half_open_.back();
   half_open_.pop_back();
-  --all_half_open_;
+  --all_half_open_.streams;
+}
+
+void FrameGuard::End(uint32_t stream) {
+  const auto found = std::find(open_.begin(), open_.end(), stream);
+  if (found == open_.end()) return;
+  *found = open_.back();
+  open_.pop_back();
 }
 
 }  // namespace hulld::server

@@ -10,6 +10,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <string_view>
 #include <utility>
 
 #include "core/base/check.h"
@@ -36,7 +37,7 @@ struct Slot {
 };
 
 std::array<std::atomic<Slot*>, kMaxGuardedDescriptors> slots;
-std::atomic<size_t> half_open_streams = 0;
+HalfOpenTotals half_open;
 std::array<std::atomic<uint64_t>, FrameGuard::kVerdictCount> closed;
 
 Slot* SlotOf(int descriptor) {
@@ -44,23 +45,40 @@ Slot* SlotOf(int descriptor) {
   return slots[static_cast<size_t>(descriptor)].load(std::memory_order_acquire);
 }
 
+// Calls `take` with each part of the first `bytes` bytes of the message, until it returns false.
+template <typename Take>
+void ForEachPart(const msghdr& message, size_t bytes, const Take& take) {
+  for (size_t i = 0; i < message.msg_iovlen && bytes > 0; ++i) {
+    const iovec& part = message.msg_iov[i];
+    const size_t size = std::min(bytes, part.iov_len);
+    if (!take(std::string_view(static_cast<const char*>(part.iov_base), size))) return;
+    bytes -= size;
+  }
+}
+
 // Returns false if the connection must be closed.
 bool Inspect(Slot& slot, const msghdr& message, size_t bytes) {
   const std::lock_guard lock(slot.mutex);
   if (!slot.guard.has_value()) return true;
   const auto now = FrameGuard::Clock::now();
-  for (size_t i = 0; i < message.msg_iovlen && bytes > 0; ++i) {
-    const iovec& part = message.msg_iov[i];
-    const size_t size = std::min(bytes, part.iov_len);
-    const auto verdict = slot.guard->Take({static_cast<const char*>(part.iov_base), size}, now);
-    if (verdict != FrameGuard::Verdict::kAllowed) {
-      ++closed[static_cast<size_t>(verdict)];
-      slot.guard.reset();
-      return false;
-    }
-    bytes -= size;
-  }
-  return true;
+  auto verdict = FrameGuard::Verdict::kAllowed;
+  ForEachPart(message, bytes, [&](std::string_view part) {
+    verdict = slot.guard->Take(part, now);
+    return verdict == FrameGuard::Verdict::kAllowed;
+  });
+  if (verdict == FrameGuard::Verdict::kAllowed) return true;
+  ++closed[static_cast<size_t>(verdict)];
+  slot.guard.reset();
+  return false;
+}
+
+void InspectSent(Slot& slot, const msghdr& message, size_t bytes) {
+  const std::lock_guard lock(slot.mutex);
+  if (!slot.guard.has_value()) return;
+  ForEachPart(message, bytes, [&](std::string_view part) {
+    slot.guard->TakeSent(part);
+    return true;
+  });
 }
 
 }  // namespace
@@ -76,7 +94,7 @@ void GuardSocket(int descriptor, uint64_t connection, const FrameLimits* limits,
   }
   const std::lock_guard lock(slot->mutex);
   slot->Clear();
-  if (limits != nullptr) slot->guard.emplace(*limits, half_open_streams, FrameGuard::Clock::now());
+  if (limits != nullptr) slot->guard.emplace(*limits, half_open, FrameGuard::Clock::now());
   slot->on_closed = std::move(on_closed);
   slot->connection = connection;
 }
@@ -101,7 +119,7 @@ std::array<uint64_t, FrameGuard::kVerdictCount> ClosedByGuard() {
   return counts;
 }
 
-size_t HalfOpenStreams() { return half_open_streams; }
+size_t HalfOpenStreams() { return half_open.streams; }
 
 }  // namespace hulld::server
 
@@ -120,6 +138,20 @@ extern "C" ssize_t recvmsg(int descriptor, msghdr* message, int flags) {
   shutdown(descriptor, SHUT_RDWR);
   errno = ECONNRESET;
   return -1;
+}
+
+extern "C" ssize_t sendmsg(int descriptor, const msghdr* message, int flags) {
+  using Function = ssize_t (*)(int, const msghdr*, int);
+  static const auto kNext = reinterpret_cast<Function>(dlsym(RTLD_NEXT, "sendmsg"));
+  const ssize_t bytes = kNext(descriptor, message, flags);
+  if (bytes <= 0) return bytes;
+  const int error = errno;
+  hulld::server::Slot* const slot = hulld::server::SlotOf(descriptor);
+  if (slot != nullptr && slot->connection != 0) {
+    hulld::server::InspectSent(*slot, *message, static_cast<size_t>(bytes));
+  }
+  errno = error;
+  return bytes;
 }
 
 extern "C" int close(int descriptor) {

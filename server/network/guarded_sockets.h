@@ -10,12 +10,12 @@
 
 namespace hulld::server {
 
-// Passes the bytes that gRPC reads from a socket to a FrameGuard before gRPC sees them, and reports
-// when gRPC closes the socket. gRPC has no hook for either, and an intermediate process or socket
-// costs two copies and two wake-ups per message. Therefore guarded_sockets.cc defines recvmsg and
-// close, which the dynamic linker prefers to the C library's, as for a preloaded library. Only gRPC
-// reads with recvmsg in this process. A connection that exceeds the limits reads as reset by its
-// peer.
+// Passes the bytes that gRPC reads from a socket to a FrameGuard before gRPC sees them, and the
+// bytes that it has written, and reports when gRPC closes the socket. gRPC has no hook for any of
+// these, and an intermediate process or socket costs two copies and two wake-ups per message.
+// Therefore guarded_sockets.cc defines recvmsg, sendmsg, and close, which the dynamic linker
+// prefers to the C library's, as for a preloaded library. Only gRPC uses recvmsg and sendmsg in
+// this process. A connection that exceeds the limits reads as reset by its peer.
 //
 // All functions are thread-safe.
 

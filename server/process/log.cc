@@ -8,6 +8,7 @@
 #include <google/protobuf/stubs/logging.h>
 #include <grpc/support/log.h>
 #include <spdlog/formatter.h>
+#include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 
@@ -24,6 +25,28 @@ namespace {
 // sinks run on the thread of LogEvent.
 thread_local const LogFields* current_fields = nullptr;
 bool is_json = false;
+
+// Escapes control characters and, on request, quotes and backslashes; replaces invalid UTF-8.
+std::string Escape(const std::string& text, bool quotes) {
+  std::string out;
+  out.reserve(text.size());
+  for (std::string_view rest = text; !rest.empty();) {
+    const auto valid = static_cast<size_t>(
+        google::protobuf::internal::UTF8SpnStructurallyValid({rest.data(), rest.size()}));
+    for (const char c : rest.substr(0, valid)) {
+      if (quotes && (c == '"' || c == '\\')) {
+        out += {'\\', c};
+      } else if (absl::ascii_iscntrl(static_cast<unsigned char>(c))) {
+        absl::StrAppend(&out, "\\u", absl::Hex(c, absl::kZeroPad4));
+      } else {
+        out += c;
+      }
+    }
+    if (valid < rest.size()) out += "\\ufffd";
+    rest.remove_prefix(std::min(rest.size(), valid + 1));
+  }
+  return out;
+}
 
 std::string FormatJson(const LogFields& fields) {
   std::string text;
@@ -45,6 +68,21 @@ std::string FormatText(const LogFields& fields) {
   }
   return text;
 }
+
+// A message in one line, because it may contain bytes of a client, which could forge lines.
+class OneLine : public spdlog::custom_flag_formatter {
+ public:
+  void format(const spdlog::details::log_msg& message, const std::tm& /*time*/,
+              spdlog::memory_buf_t& out) override {
+    const std::string text =
+        Escape(std::string(message.payload.data(), message.payload.size()), /*quotes=*/false);
+    out.append(text.data(), text.data() + text.size());
+  }
+
+  std::unique_ptr<spdlog::custom_flag_formatter> clone() const override {
+    return std::make_unique<OneLine>();
+  }
+};
 
 class JsonFormatter : public spdlog::formatter {
  public:
@@ -102,26 +140,7 @@ void LogForProtobuf(google::protobuf::LogLevel level, const char* file, int line
 
 }  // namespace
 
-std::string JsonEscape(const std::string& text) {
-  std::string out;
-  out.reserve(text.size());
-  for (std::string_view rest = text; !rest.empty();) {
-    const auto valid = static_cast<size_t>(
-        google::protobuf::internal::UTF8SpnStructurallyValid({rest.data(), rest.size()}));
-    for (const char c : rest.substr(0, valid)) {
-      if (c == '"' || c == '\\') {
-        out += {'\\', c};
-      } else if (absl::ascii_iscntrl(static_cast<unsigned char>(c))) {
-        absl::StrAppend(&out, "\\u", absl::Hex(c, absl::kZeroPad4));
-      } else {
-        out += c;
-      }
-    }
-    if (valid < rest.size()) out += "\\ufffd";
-    rest.remove_prefix(std::min(rest.size(), valid + 1));
-  }
-  return out;
-}
+std::string JsonEscape(const std::string& text) { return Escape(text, /*quotes=*/true); }
 
 LogField::LogField(const char* field, double number)
     : name(field), value(absl::StrFormat("%.3f", number)), is_number(true) {}
@@ -159,7 +178,9 @@ void SetUpLog(const std::string& level, const std::string& format) {
   if (is_json) {
     logger->set_formatter(std::make_unique<JsonFormatter>());
   } else {
-    logger->set_pattern("%Y-%m-%dT%H:%M:%S.%e%z %l %v");
+    auto formatter = std::make_unique<spdlog::pattern_formatter>();
+    formatter->add_flag<OneLine>('*').set_pattern("%Y-%m-%dT%H:%M:%S.%e%z %l %*");
+    logger->set_formatter(std::move(formatter));
   }
   logger->set_level(spdlog::level::from_str(level));
   logger->flush_on(spdlog::level::debug);

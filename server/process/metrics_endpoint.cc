@@ -15,7 +15,9 @@
 #include <boost/beast/http/status.hpp>
 #include <boost/beast/http/verb.hpp>
 #include <chrono>
+#include <list>
 #include <memory>
+#include <optional>
 #include <string>
 #include <thread>
 #include <utility>
@@ -34,7 +36,8 @@ using boost::system::error_code;
 using tcp = boost::asio::ip::tcp;
 
 constexpr char kFlag[] = "--metrics-address";
-// Enough for a few scrapers and manual queries; further connections are closed immediately.
+// Enough for a few scrapers and manual queries. A further connection replaces the one that has been
+// in its current state, waiting for a request or for its reply to be read, for the longest time.
 constexpr size_t kMaxConnections = 64;
 constexpr uint32_t kMaxHeaderBytes = 8 << 10;
 // Timeout for receiving a request, and for sending its reply.
@@ -45,23 +48,43 @@ constexpr std::chrono::milliseconds kAcceptPause{100};
 // A connection. Owns itself while an operation is pending.
 class Connection : public std::enable_shared_from_this<Connection> {
  public:
-  Connection(tcp::socket socket, const Metrics& metrics, size_t& connections)
-      : stream_(std::move(socket)), metrics_(metrics), connections_(connections) {
-    ++connections_;
-  }
+  // The open connections, by the time of their last state change.
+  using List = std::list<Connection*>;
+
+  Connection(tcp::socket socket, const Metrics& metrics, List& open)
+      : stream_(std::move(socket)),
+        metrics_(metrics),
+        open_(open),
+        place_(open.insert(open.end(), this)) {}
   Connection(const Connection&) = delete;
   Connection& operator=(const Connection&) = delete;
-  ~Connection() { --connections_; }
+  ~Connection() { Leave(); }
 
   void Read() {
-    stream_.expires_after(kTimeout);
+    Expire();
     asio::async_read_until(stream_, asio::dynamic_buffer(input_, kMaxHeaderBytes), "\r\n\r\n",
                            [self = shared_from_this()](error_code error, size_t size) {
                              if (!error) self->Answer(size);
                            });
   }
 
+  // Ends the pending operation.
+  void Close() {
+    Leave();
+    stream_.close();
+  }
+
  private:
+  void Leave() {
+    if (place_.has_value()) open_.erase(*std::exchange(place_, std::nullopt));
+  }
+
+  // Starts the timeout of the next operation.
+  void Expire() {
+    stream_.expires_after(kTimeout);
+    if (place_.has_value()) open_.splice(open_.end(), open_, *place_);
+  }
+
   // Answers the first `size` bytes of input. Malformed requests and those with a body get no
   // answer.
   void Answer(size_t size) {
@@ -93,7 +116,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
         "\r\nContent-Type: text/plain; version=0.0.4; charset=utf-8\r\nAllow: GET, HEAD\r\n",
         "Connection: ", keep_alive ? "keep-alive" : "close", "\r\nContent-Length: ", body.size(),
         "\r\n\r\n", is_head ? "" : body);
-    stream_.expires_after(kTimeout);
+    Expire();
     asio::async_write(stream_, asio::buffer(reply_),
                       [self = shared_from_this(), keep_alive](error_code failure, size_t /*size*/) {
                         if (!failure && keep_alive) return self->Read();
@@ -104,7 +127,9 @@ class Connection : public std::enable_shared_from_this<Connection> {
 
   beast::tcp_stream stream_;
   const Metrics& metrics_;
-  size_t& connections_;
+  List& open_;
+  // None after Close.
+  std::optional<List::iterator> place_;
   std::string input_;
   std::string reply_;
 };
@@ -143,16 +168,15 @@ class Listener : public MetricsEndpoint {
         pause_.expires_after(kAcceptPause);
         return pause_.async_wait([this](error_code) { Accept(); });
       }
-      if (connections_ < kMaxConnections) {
-        std::make_shared<Connection>(std::move(socket), metrics_, connections_)->Read();
-      }
+      if (open_.size() >= kMaxConnections) open_.front()->Close();
+      std::make_shared<Connection>(std::move(socket), metrics_, open_)->Read();
       Accept();
     });
   }
 
   const Metrics& metrics_;
-  size_t connections_ = 0;
-  // Destroys the remaining connections, which update the count.
+  Connection::List open_;
+  // Destroys the remaining connections, which update the list.
   asio::io_context context_{1};
   tcp::acceptor acceptor_{context_};
   asio::steady_timer pause_{context_};

@@ -167,6 +167,9 @@ absl::Status RocksDbStore::OpenDb() {
           ? OpenForReading()
           : rocksdb::DB::Open(DbOptions(), DatabaseDirectory(options_.data_dir), &db);
   if (!logs_checked_.ok()) return logs_checked_;
+  if (options_.accept_loss && status.IsCorruption()) {
+    return DamagedBeyondLog(status, options_.data_dir);
+  }
   if (!status.ok()) return OpenError(status, options_.data_dir, options_.read_only);
   if (db != nullptr) db_.reset(db);
   return absl::OkStatus();
@@ -202,7 +205,8 @@ absl::Status RocksDbStore::OpenDbWithReserve() {
 // lock, because no process can write there.
 absl::Status RocksDbStore::Lock() {
   const std::string directory = DatabaseDirectory(options_.data_dir);
-  if (!env_->FileExists(directory + "/CURRENT").ok()) {
+  if (!env_->FileExists(CurrentPath(directory)).ok()) {
+    HULLD_RETURN_IF_ERROR(CheckLogs());
     return absl::NotFoundError(
         absl::StrCat("--data-dir ", options_.data_dir, " contains no hulld store"));
   }
@@ -216,6 +220,12 @@ absl::Status RocksDbStore::CheckLogs() {
   const std::string directory = DatabaseDirectory(options_.data_dir);
   const std::string path = LogMarkPath(options_.data_dir);
   absl::StatusOr<std::optional<LogMark>> mark = ReadLogMark(*files_, path);
+  const std::optional<LogMark> known = mark.ok() ? *mark : std::nullopt;
+  HULLD_ASSIGN_OR_RETURN(const std::string finding, FindLostManifest(*files_, directory, known));
+  if (!finding.empty()) {
+    return ManifestLost(options_.data_dir, finding,
+                        known.has_value() ? std::optional(known->revision) : std::nullopt);
+  }
   if (absl::IsDataLoss(mark.status())) {
     if (options_.accept_loss) return absl::OkStatus();
     return LogLost(options_.data_dir, std::string(mark.status().message()), std::nullopt);

@@ -139,7 +139,8 @@ class RocksDbStore : public Store {
   // Opens the database for reading, without its lock.
   rocksdb::Status OpenForReading();
   absl::Status Lock();
-  // Compares the logs with their mark. Requires: this process holds the database's lock.
+  // Compares the logs and the manifest with their mark. Requires: this process holds the database's
+  // lock, or there is no database.
   absl::Status CheckLogs();
   absl::Status DropLogsFrom(uint64_t number);
   absl::Status StartMark();

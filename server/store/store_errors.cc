@@ -19,12 +19,24 @@ bool ReportsFullDisk(const rocksdb::Status& status) {
          absl::StrContains(cause, std::strerror(EDQUOT));
 }
 
+// RocksDB names the cause only in text. The path, which may contain anything, follows it; a lock
+// file that cannot be opened is another error.
+bool IsLocked(const std::string& cause) {
+  return absl::StartsWithIgnoreCase(cause, "IO error: While lock file:") ||
+         absl::StartsWithIgnoreCase(cause, "IO error: lock hold by current process");
+}
+
 absl::Status DiskFull(const std::string& cause, const std::string& data_dir) {
   return WithReason(absl::ResourceExhaustedError(absl::StrCat(
                         "the disk that contains --data-dir ", data_dir, " is full (", cause,
                         "); nothing was changed; delete hulls or free disk space, then retry; no "
                         "restart is needed")),
                     v1::ERROR_REASON_DISK_FULL);
+}
+
+std::string Acknowledged(std::optional<uint64_t> revision) {
+  if (!revision.has_value()) return "";
+  return absl::StrCat("changes up to revision ", *revision, " were acknowledged, and ");
 }
 
 }  // namespace
@@ -55,7 +67,7 @@ absl::Status CannotBeRead(const std::string& data_dir) {
 
 absl::Status OpenError(const rocksdb::Status& status, const std::string& data_dir, bool read_only) {
   const std::string cause = status.ToString();
-  if (cause.find("lock") != std::string::npos || cause.find("LOCK") != std::string::npos) {
+  if (IsLocked(cause)) {
     return absl::FailedPreconditionError(
         absl::StrCat("--data-dir ", data_dir, " is in use by another hulld (", cause,
                      "); stop that server, or use another directory"));
@@ -75,14 +87,24 @@ absl::Status OpenError(const rocksdb::Status& status, const std::string& data_di
 
 absl::Status LogLost(const std::string& data_dir, const std::string& finding,
                      std::optional<uint64_t> revision) {
-  const std::string changes =
-      revision.has_value()
-          ? absl::StrCat("changes up to revision ", *revision, " were acknowledged, and ")
-          : "";
   return absl::DataLossError(absl::StrCat(
-      "--data-dir ", data_dir, " may lack acknowledged changes (", changes, finding,
+      "--data-dir ", data_dir, " may lack acknowledged changes (", Acknowledged(revision), finding,
       "); nothing was changed; put the file back, restore a backup into another directory, or "
       "accept the loss with 'hulld doctor --accept-loss'"));
+}
+
+absl::Status ManifestLost(const std::string& data_dir, const std::string& finding,
+                          std::optional<uint64_t> revision) {
+  return absl::DataLossError(absl::StrCat(
+      "--data-dir ", data_dir, " is damaged (", Acknowledged(revision), finding,
+      "); nothing was changed; put the file back, or restore a backup into another directory"));
+}
+
+absl::Status DamagedBeyondLog(const rocksdb::Status& status, const std::string& data_dir) {
+  return absl::DataLossError(absl::StrCat(
+      "--data-dir ", data_dir, " is damaged (", status.ToString(),
+      "); not only its log is affected, so its remains cannot be served; restore a backup into "
+      "another directory"));
 }
 
 absl::Status OtherFormat(const std::string& where, uint64_t found, uint64_t expected) {

@@ -29,6 +29,11 @@ bool IsDiskFull(const absl::Status& status);
 // finding: names the file.
 absl::Status LogLost(const std::string& data_dir, const std::string& finding,
                      std::optional<uint64_t> revision);
+// DATA_LOSS: the manifest or CURRENT is lost, so the tables cannot be found; otherwise as LogLost.
+absl::Status ManifestLost(const std::string& data_dir, const std::string& finding,
+                          std::optional<uint64_t> revision);
+// DATA_LOSS: a store is damaged beyond the loss that 'hulld doctor' accepted.
+absl::Status DamagedBeyondLog(const rocksdb::Status& status, const std::string& data_dir);
 // FAILED_PRECONDITION: a store is in a format that this hulld does not read. where: names the
 // store.
 absl::Status OtherFormat(const std::string& where, uint64_t found, uint64_t expected);

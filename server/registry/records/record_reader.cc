@@ -150,6 +150,11 @@ FoundBodies RecordReader::FindBodies(std::span<const std::string> ids,
   return found;
 }
 
+absl::Status RecordReader::NoSuchBody(const std::string& id) {
+  const Locked locked(state_.mutex);
+  return state_.NoSuch("body", id);
+}
+
 // Releases the mutex during the read. The reads may end later than this call.
 void RecordReader::ReadRecords(Locked& locked, const PendingReads& reads) {
   std::vector<std::string> ids;

@@ -75,6 +75,9 @@ class RecordReader final : public PageSource {
   FoundBodies FindBodies(std::span<const std::string> ids,
                          const std::function<bool()>& should_stop = {}, bool may_wait = true);
 
+  // Returns the error for an ID that FindBodies did not find. The message says so if a hull has it.
+  absl::Status NoSuchBody(const std::string& id);
+
   // Ends the read of the ID, which a peer server changed; its tasks look the ID up again. Requires
   // the mutex.
   void OnPeerChange(const std::string& id);

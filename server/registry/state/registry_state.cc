@@ -66,8 +66,10 @@ std::shared_ptr<const Body> RegistryState::FindBody(const std::string& id) {
   return entry == nullptr ? nullptr : entry->committed();
 }
 
-absl::Status RegistryState::NoSuch(const std::string& kind, const std::string& id) const {
-  return NotFound(kind, id, kind == "body" ? hulls.contains(id) : bodies.contains(id));
+absl::Status RegistryState::NoSuch(const std::string& kind, const std::string& id) {
+  if (kind == "hull") return NotFound(kind, id, bodies.contains(id));
+  const HullPointer hull = hulls.Find(id);
+  return NotFound(kind, id, hull != nullptr && hull->state.visible());
 }
 
 void RegistryState::AddStored(const std::string& id, const absl::StatusOr<StoredHull>& stored) {

@@ -91,7 +91,7 @@ class RegistryState {
   // whose read failed is unknown).
   std::shared_ptr<const Body> FindBody(const std::string& id);
   // NOT_FOUND; if the ID belongs to the other kind, the message says so. kind: "hull" or "body".
-  absl::Status NoSuch(const std::string& kind, const std::string& id) const;
+  absl::Status NoSuch(const std::string& kind, const std::string& id);
 
   // Adds a stored hull, at rest or as damaged. Requires: the hull table has no hull with the ID.
   void AddStored(const std::string& id, const absl::StatusOr<StoredHull>& stored);

@@ -11,6 +11,16 @@ using rocksdb::IODebugContext;
 using rocksdb::IOOptions;
 using rocksdb::IOStatus;
 
+namespace {
+
+void Extend(LogMark::Synced& written, const rocksdb::Slice& data) {
+  written.size += data.size();
+  written.crc32 = static_cast<uint32_t>(
+      crc32_z(written.crc32, reinterpret_cast<const Bytef*>(data.data()), data.size()));
+}
+
+}  // namespace
+
 // A file open for writing. Counts its failed syncs.
 class LogFileSystem::File : public rocksdb::FSWritableFileOwnerWrapper {
  public:
@@ -88,15 +98,50 @@ class LogFileSystem::Log : public File {
   // A failed call may have written any part of the data; none of it will be committed.
   IOStatus Note(const rocksdb::Slice& data, const IOStatus& status) {
     const std::lock_guard lock(system_.mutex_);
-    LogMark::Synced& written = system_.logs_[name_].written;
-    written.size += data.size();
-    written.crc32 = static_cast<uint32_t>(
-        crc32_z(written.crc32, reinterpret_cast<const Bytef*>(data.data()), data.size()));
+    Extend(system_.logs_[name_].written, data);
     return status;
   }
 
   const std::string name_;
   std::atomic<bool> is_cut_ = false;
+};
+
+// RocksDB abandons a manifest after a failed write.
+class LogFileSystem::Manifest : public File {
+ public:
+  Manifest(LogFileSystem& system, uint64_t number, std::unique_ptr<rocksdb::FSWritableFile> file)
+      : File(system, std::move(file)), number_(number) {}
+
+  IOStatus Append(const rocksdb::Slice& data, const IOOptions& options,
+                  IODebugContext* debug) override {
+    return Note(data, FSWritableFileOwnerWrapper::Append(data, options, debug));
+  }
+  IOStatus Append(const rocksdb::Slice& data, const IOOptions& options,
+                  const rocksdb::DataVerificationInfo& info, IODebugContext* debug) override {
+    return Note(data, FSWritableFileOwnerWrapper::Append(data, options, info, debug));
+  }
+  IOStatus Sync(const IOOptions& options, IODebugContext* debug) override {
+    return NoteSynced(File::Sync(options, debug));
+  }
+  IOStatus Fsync(const IOOptions& options, IODebugContext* debug) override {
+    return NoteSynced(File::Fsync(options, debug));
+  }
+
+ private:
+  IOStatus Note(const rocksdb::Slice& data, const IOStatus& status) {
+    Extend(written_, data);
+    is_whole_ = is_whole_ && status.ok();
+    return status;
+  }
+  IOStatus NoteSynced(const IOStatus& status) {
+    is_whole_ = is_whole_ && status.ok();
+    if (is_whole_) system_.NoteManifest(number_, written_);
+    return status;
+  }
+
+  const uint64_t number_;
+  LogMark::Synced written_;
+  bool is_whole_ = true;
 };
 
 IOStatus LogFileSystem::NoteSync(const IOStatus& status) {
@@ -163,7 +208,9 @@ IOStatus LogFileSystem::StartMark(const std::string& path, uint64_t revision) {
   LogMark mark;
   {
     const std::lock_guard lock(mutex_);
-    mark_ = {1, revision, {}};
+    mark_.generation = 1;
+    mark_.revision = revision;
+    mark_.logs.clear();
     NoteCommitted();
     mark = mark_;
   }
@@ -203,12 +250,38 @@ IOStatus LogFileSystem::NewWritableFile(const std::string& name,
                                         IODebugContext* debug) {
   const IOStatus opened = FileSystemWrapper::NewWritableFile(name, options, result, debug);
   if (!opened.ok()) return opened;
-  if (!IsLog(name)) {
+  const std::optional<uint64_t> manifest = ManifestNumber(name);
+  if (IsLog(name)) {
+    *result = std::make_unique<Log>(*this, name, std::move(*result));
+  } else if (manifest.has_value() && name == ManifestPath(directory_, *manifest)) {
+    *result = std::make_unique<Manifest>(*this, *manifest, std::move(*result));
+  } else {
     *result = std::make_unique<File>(*this, std::move(*result));
-    return opened;
   }
-  *result = std::make_unique<Log>(*this, name, std::move(*result));
   return opened;
+}
+
+void LogFileSystem::NoteManifest(uint64_t number, const LogMark::Synced& synced) {
+  const std::lock_guard lock(mutex_);
+  newest_manifest_ = number;
+  newest_manifest_synced_ = synced;
+  if (number != mark_.manifest) return;
+  mark_.manifest_synced = synced;
+  if (mark_file_ != nullptr) WriteMark();
+}
+
+// RocksDB syncs a new manifest before it renames a file to CURRENT that names it.
+IOStatus LogFileSystem::RenameFile(const std::string& from, const std::string& to,
+                                   const IOOptions& options, IODebugContext* debug) {
+  const IOStatus renamed = FileSystemWrapper::RenameFile(from, to, options, debug);
+  if (!renamed.ok() || to != CurrentPath(directory_)) return renamed;
+  const absl::StatusOr<std::optional<uint64_t>> current = ReadCurrent(*target(), directory_);
+  const std::lock_guard lock(mutex_);
+  if (!current.ok() || *current != newest_manifest_) return renamed;
+  mark_.manifest = newest_manifest_;
+  mark_.manifest_synced = newest_manifest_synced_;
+  if (mark_file_ != nullptr) WriteMark();
+  return renamed;
 }
 
 IOStatus LogFileSystem::NewDirectory(const std::string& name, const IOOptions& options,

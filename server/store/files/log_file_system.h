@@ -24,7 +24,8 @@ namespace hulld::server {
 //
 // A mark (log_mark.h) records the committed part that is on disk, so that the next start detects a
 // log that lost some of it. The mark costs one write of 512 bytes to the page cache for each
-// commit, and no sync: it is synced in the background and before a log is deleted.
+// commit, and no sync: it is synced in the background and before a log is deleted. The mark also
+// covers the manifest.
 //
 // Hides the free space of the disk from RocksDB, which would otherwise resume after an error and
 // write to a failed log.
@@ -66,6 +67,9 @@ class LogFileSystem : public rocksdb::FileSystemWrapper {
   rocksdb::IOStatus NewDirectory(const std::string& name, const rocksdb::IOOptions& options,
                                  std::unique_ptr<rocksdb::FSDirectory>* result,
                                  rocksdb::IODebugContext* debug) override;
+  rocksdb::IOStatus RenameFile(const std::string& from, const std::string& to,
+                               const rocksdb::IOOptions& options,
+                               rocksdb::IODebugContext* debug) override;
   rocksdb::IOStatus DeleteFile(const std::string& name, const rocksdb::IOOptions& options,
                                rocksdb::IODebugContext* debug) override;
   rocksdb::IOStatus LockFile(const std::string& name, const rocksdb::IOOptions& options,
@@ -77,6 +81,7 @@ class LogFileSystem : public rocksdb::FileSystemWrapper {
   class File;
   class Directory;
   class Log;
+  class Manifest;
   struct LogState {
     LogMark::Synced written;
     LogMark::Synced committed;
@@ -87,6 +92,8 @@ class LogFileSystem : public rocksdb::FileSystemWrapper {
   bool IsLog(const std::string& name) const;
   rocksdb::IOStatus NoteSync(const rocksdb::IOStatus& status);
   rocksdb::IOStatus Cut(const std::string& name, const LogState& log);
+  // Adds the synced bytes of a manifest to the mark if CURRENT names it.
+  void NoteManifest(uint64_t number, const LogMark::Synced& synced);
   // Removes a log from the mark, before the log is deleted.
   rocksdb::IOStatus Forget(const std::string& name);
   // The following require the mutex.
@@ -101,6 +108,9 @@ class LogFileSystem : public rocksdb::FileSystemWrapper {
   // Guarded by the mutex.
   std::map<std::string, LogState> logs_;
   LogMark mark_;
+  // The newest manifest, which CURRENT may not name yet, and its synced bytes.
+  uint64_t newest_manifest_ = 0;
+  LogMark::Synced newest_manifest_synced_;
   // Null: no mark is kept.
   std::shared_ptr<rocksdb::FSRandomRWFile> mark_file_;
   bool mark_changed_ = false;

@@ -11,7 +11,9 @@
 #include <filesystem>
 #include <iterator>
 #include <memory>
+#include <string_view>
 #include <utility>
+#include <vector>
 
 #include "core/base/status_macros.h"
 #include "server/contract/errors.h"
@@ -23,8 +25,9 @@ using rocksdb::FileOptions;
 using rocksdb::IOOptions;
 using rocksdb::IOStatus;
 
-// A slot: generation, revision, number of logs; number, size and CRC-32 of each; zeros; and the
-// CRC-32 of all of these. It fills one sector, which disks write as a whole.
+// A slot: generation, revision, number of logs; number, size and CRC-32 of each; zeros; number,
+// size, and CRC-32 of the manifest; and the CRC-32 of all of these. It fills one sector, which
+// disks write as a whole.
 constexpr size_t kSlotWords = 64;
 using Slot = std::array<uint64_t, kSlotWords>;
 static_assert(sizeof(Slot) == 512);
@@ -32,7 +35,8 @@ static_assert(sizeof(Slot) == 512);
 constexpr uint64_t kSlotDistance = 4096;
 constexpr size_t kHeadWords = 3;
 constexpr size_t kLogWords = 3;
-constexpr size_t kMaxLogs = (kSlotWords - kHeadWords - 1) / kLogWords;
+constexpr size_t kManifestWord = kSlotWords - 1 - kLogWords;
+constexpr size_t kMaxLogs = (kManifestWord - kHeadWords) / kLogWords;
 
 uint32_t Crc32(uint32_t crc, std::string_view bytes) {
   return static_cast<uint32_t>(
@@ -57,6 +61,9 @@ Slot Encode(const LogMark& mark) {
     slot[word + 1] = log->second.size;
     slot[word + 2] = log->second.crc32;
   }
+  slot[kManifestWord] = mark.manifest;
+  slot[kManifestWord + 1] = mark.manifest_synced.size;
+  slot[kManifestWord + 2] = mark.manifest_synced.crc32;
   slot.back() = ChecksumOf(slot);
   return slot;
 }
@@ -64,7 +71,11 @@ Slot Encode(const LogMark& mark) {
 // None if the slot was never written, or is damaged.
 std::optional<LogMark> Decode(const Slot& slot) {
   if (slot.back() != ChecksumOf(slot) || slot[0] == 0 || slot[2] > kMaxLogs) return std::nullopt;
-  LogMark mark = {slot[0], slot[1], {}};
+  LogMark mark;
+  mark.generation = slot[0];
+  mark.revision = slot[1];
+  mark.manifest = slot[kManifestWord];
+  mark.manifest_synced = {slot[kManifestWord + 1], static_cast<uint32_t>(slot[kManifestWord + 2])};
   for (size_t i = 0; i < slot[2]; ++i) {
     const uint64_t* const log = &slot[kHeadWords + i * kLogWords];
     mark.logs[log[0]] = {log[1], static_cast<uint32_t>(log[2])};
@@ -72,15 +83,18 @@ std::optional<LogMark> Decode(const Slot& slot) {
   return mark;
 }
 
-// Returns a description of the difference; empty if the log starts with these bytes.
+absl::Status CannotRead(const std::string& path, const IOStatus& status) {
+  return Unavailable("cannot read ", path, ": ", status.ToString());
+}
+
+// Returns a description of the difference; empty if the file starts with these bytes.
 absl::StatusOr<std::string> Compare(rocksdb::FileSystem& files, const std::string& path,
                                     const LogMark::Synced& synced) {
-  const std::string name = std::filesystem::path(path).filename();
-  const auto failure = [&](const IOStatus& status) {
-    return Unavailable("cannot read ", path, ": ", status.ToString());
-  };
+  const std::string name = absl::StrCat(LogNumber(path).has_value() ? "the log " : "the file ",
+                                        std::filesystem::path(path).filename().string());
+  const auto failure = [&](const IOStatus& status) { return CannotRead(path, status); };
   if (files.FileExists(path, IOOptions(), nullptr).IsNotFound()) {
-    return absl::StrCat("the log ", name, " is missing");
+    return absl::StrCat(name, " is missing");
   }
   std::unique_ptr<rocksdb::FSSequentialFile> file;
   IOStatus status = files.NewSequentialFile(path, FileOptions(), &file, nullptr);
@@ -94,13 +108,13 @@ absl::StatusOr<std::string> Compare(rocksdb::FileSystem& files, const std::strin
     status = file->Read(wanted, IOOptions(), &read, scratch.data(), nullptr);
     if (!status.ok()) return failure(status);
     if (read.empty()) {
-      return absl::StrCat("the log ", name, " has ", size, " bytes of ", synced.size);
+      return absl::StrCat(name, " has ", size, " bytes of ", synced.size);
     }
     size += read.size();
     crc32 = Crc32(crc32, {read.data(), read.size()});
   }
   if (crc32 == synced.crc32) return std::string();
-  return absl::StrCat("the contents of the log ", name, " differ from what was written");
+  return absl::StrCat("the contents of ", name, " differ from what was written");
 }
 
 }  // namespace
@@ -120,6 +134,65 @@ std::optional<uint64_t> LogNumber(const std::string& path) {
   uint64_t number = 0;
   const bool is_log = file.extension() == ".log" && absl::SimpleAtoi(file.stem().string(), &number);
   return is_log ? std::optional(number) : std::nullopt;
+}
+
+std::string ManifestPath(const std::string& directory, uint64_t number) {
+  return absl::StrFormat("%s/MANIFEST-%06u", directory, number);
+}
+
+std::optional<uint64_t> ManifestNumber(const std::string& path) {
+  constexpr std::string_view kPrefix = "MANIFEST-";
+  const std::string name = std::filesystem::path(path).filename();
+  uint64_t number = 0;
+  const bool is_manifest =
+      name.starts_with(kPrefix) && absl::SimpleAtoi(name.substr(kPrefix.size()), &number);
+  return is_manifest ? std::optional(number) : std::nullopt;
+}
+
+std::string CurrentPath(const std::string& directory) { return directory + "/CURRENT"; }
+
+absl::StatusOr<std::optional<uint64_t>> ReadCurrent(rocksdb::FileSystem& files,
+                                                    const std::string& directory) {
+  const std::string path = CurrentPath(directory);
+  const IOStatus exists = files.FileExists(path, IOOptions(), nullptr);
+  if (exists.IsNotFound()) return absl::NotFoundError(path);
+  std::unique_ptr<rocksdb::FSSequentialFile> file;
+  IOStatus status = files.NewSequentialFile(path, FileOptions(), &file, nullptr);
+  char scratch[64];
+  rocksdb::Slice read;
+  if (status.ok()) {
+    status = file->Read(sizeof scratch, IOOptions(), &read, scratch, nullptr);
+  }
+  if (!status.ok()) return CannotRead(path, status);
+  if (!read.ends_with("\n")) return std::nullopt;
+  read.remove_suffix(1);
+  return ManifestNumber(read.ToString());
+}
+
+absl::StatusOr<std::string> FindLostManifest(rocksdb::FileSystem& files,
+                                             const std::string& directory,
+                                             const std::optional<LogMark>& mark) {
+  const absl::StatusOr<std::optional<uint64_t>> current = ReadCurrent(files, directory);
+  if (absl::IsNotFound(current.status())) {
+    // The first start writes CURRENT before any table, log, or mark.
+    std::vector<std::string> names;
+    files.GetChildren(directory, IOOptions(), &names, nullptr).PermitUncheckedError();
+    const bool has_data = std::ranges::any_of(names, [](const std::string& name) {
+      return LogNumber(name).has_value() || name.ends_with(".sst");
+    });
+    return has_data || mark.has_value() ? "the file CURRENT is missing" : std::string();
+  }
+  if (!current.ok()) return current.status();
+  if (!current->has_value()) return "the file CURRENT is damaged";
+  const uint64_t number = **current;
+  const uint64_t marked = mark.has_value() ? mark->manifest : 0;
+  if (number < marked) {
+    return absl::StrFormat("the file CURRENT names MANIFEST-%06u instead of MANIFEST-%06u", number,
+                           marked);
+  }
+  // The mark of a new manifest may not have been written.
+  return Compare(files, ManifestPath(directory, number),
+                 number == marked ? mark->manifest_synced : LogMark::Synced());
 }
 
 absl::StatusOr<std::optional<LostLog>> FindLostLog(rocksdb::FileSystem& files,
@@ -150,9 +223,7 @@ absl::StatusOr<std::optional<LogMark>> ReadLogMark(rocksdb::FileSystem& files,
     if (!mark.has_value()) continue;
     if (!newest.has_value() || mark->generation > newest->generation) newest = std::move(mark);
   }
-  if (!status.ok()) {
-    return Unavailable("cannot read ", path, ": ", status.ToString());
-  }
+  if (!status.ok()) return CannotRead(path, status);
   if (!newest.has_value()) return absl::DataLossError(absl::StrCat(path, " is damaged"));
   return newest;
 }

@@ -12,11 +12,11 @@
 
 namespace hulld::server {
 
-// The high-water mark of the write-ahead logs: a lower bound on their synced bytes. A starting
-// server compares the logs with the mark before it opens the database, which replays and deletes
-// the logs.
+// The high-water mark of the write-ahead logs and of the manifest, which names the tables: a lower
+// bound on their synced bytes. A starting server compares the files with the mark before it opens
+// the database, which replays and deletes the logs, and deletes tables that no manifest names.
 struct LogMark {
-  // Size and checksum of a prefix of a log.
+  // Size and checksum of a prefix of a file.
   struct Synced {
     uint64_t size = 0;
     uint32_t crc32 = 0;
@@ -30,6 +30,10 @@ struct LogMark {
   uint64_t revision = 0;
   // The live logs, by their numbers.
   std::map<uint64_t, Synced> logs;
+  // The number of the manifest named by CURRENT, and its synced bytes. 0: unknown, in a mark of an
+  // earlier version.
+  uint64_t manifest = 0;
+  Synced manifest_synced;
 };
 
 // Makes the entries of a directory durable.
@@ -39,6 +43,25 @@ rocksdb::IOStatus SyncDirectory(rocksdb::FileSystem& files, const std::string& d
 std::string LogPath(const std::string& directory, uint64_t number);
 // Parses such a name; nullopt for any other file.
 std::optional<uint64_t> LogNumber(const std::string& path);
+
+// "MANIFEST-000010" in `directory`, as RocksDB names it.
+std::string ManifestPath(const std::string& directory, uint64_t number);
+// Parses such a name; nullopt for any other file.
+std::optional<uint64_t> ManifestNumber(const std::string& path);
+// "CURRENT" in `directory`, which names the manifest.
+std::string CurrentPath(const std::string& directory);
+// Returns the number of the manifest that CURRENT names; nullopt if CURRENT is damaged. NOT_FOUND:
+// CURRENT does not exist. UNAVAILABLE: it cannot be read.
+absl::StatusOr<std::optional<uint64_t>> ReadCurrent(rocksdb::FileSystem& files,
+                                                    const std::string& directory);
+
+// Returns a finding if CURRENT or the manifest that it names is missing, damaged, or contradicts
+// `mark`; empty if both are sound, or if `directory` contains no database and there is no mark.
+// RocksDB would otherwise create an empty database, or open part of one, and delete the tables.
+// UNAVAILABLE: a file cannot be read.
+absl::StatusOr<std::string> FindLostManifest(rocksdb::FileSystem& files,
+                                             const std::string& directory,
+                                             const std::optional<LogMark>& mark);
 
 // Returns the first log in `directory` that contradicts `mark`, with the finding: it is missing,
 // too short, or has different bytes. None if all logs match. UNAVAILABLE: a log cannot be read.

@@ -15,6 +15,7 @@ import pytest
 
 import hulld
 from fake_hulld import FakeHulld, refuse
+from hulld.aio import transport
 from hulld.calls.reported_pairs import WatchedPlacements
 from hulld.calls.requests import SceneFilter, watch_hulls
 from hulld.errors import from_status
@@ -361,6 +362,27 @@ def test_a_watch_that_cannot_read_an_answer_ends_its_call() -> None:
 
 
 # --- Errors ---
+
+
+def test_a_task_cancelled_just_after_its_call_ended_is_cancelled() -> None:
+    class EndedCall:
+        async def read(self) -> bytes:
+            try:
+                await asyncio.Event().wait()
+            except asyncio.CancelledError:
+                pass
+            # What grpc 1.51 does: it uses a variable that it has not set.
+            raise UnboundLocalError("raw_response")
+
+    async def cancel_a_read() -> None:
+        reading = asyncio.create_task(transport.read(EndedCall()))
+        await asyncio.sleep(0)
+        reading.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await reading
+        assert reading.cancelled()
+
+    asyncio.run(cancel_a_read())
 
 
 def test_an_error_has_the_class_of_its_status() -> None:

@@ -125,7 +125,11 @@ TEST_F(BodyCalls, HullsAndBodiesShareTheirIds) {
   EXPECT_THAT(TextOf(client.GetHull("body").status()),
               HasSubstr("is a body; this call requires a hull"));
   EXPECT_TRUE(absl::IsNotFound(client.DeleteHull("body").status()));
-  EXPECT_THAT(TextOf(client.DeleteBody("hull").status()), HasSubstr("is a hull, not a body"));
+  for (const absl::Status& status :
+       {client.DeleteBody("hull").status(), client.GetBody("hull").status()}) {
+    EXPECT_EQ(ReasonOf(status), v1::ERROR_REASON_BODY_NOT_FOUND);
+    EXPECT_THAT(TextOf(status), HasSubstr("is a hull, not a body"));
+  }
   ASSERT_TRUE(client.DeleteBody("body").ok());
   EXPECT_TRUE(client.CreateHull("body").ok());
 }

@@ -16,6 +16,7 @@
 
 #include "client/calls/grpc_status.h"
 #include "client/watch/hull_watch.h"
+#include "server/hulls/watch_event.h"
 #include "tests/server/harness/test_server.h"
 
 namespace hulld::server {
@@ -105,6 +106,36 @@ class WatchHulls : public ServerTest {
         server_->address(), grpc::InsecureChannelCredentials(), arguments));
   }
 };
+
+// The box of a hull that is not in memory is read after the batch was taken. If the hull was
+// replaced in between, "CHANGED", which means the same incarnation, would be sent with the new one.
+TEST(WatchEvent, AnEventNeverDescribesALaterIncarnationThanItsKind) {
+  const auto change_of = [](ChangeKind kind, uint64_t create_revision, uint64_t revision) {
+    HullChange change;
+    change.kind = kind;
+    change.record.hull_id = "h";
+    change.record.create_revision = create_revision;
+    change.record.revision = revision;
+    return change;
+  };
+  const Box box = {Vector(0, 0, 0), Vector(1, 1, 1)};
+  for (const ChangeKind kind :
+       {ChangeKind::kCreated, ChangeKind::kChanged, ChangeKind::kReplaced}) {
+    const HullChange change = change_of(kind, 5, 6);
+    EXPECT_FALSE(AtCurrentState(change, change_of(kind, 7, 7).record, box).has_value());
+    const std::optional<HullChange> later =
+        AtCurrentState(change, change_of(kind, 5, 8).record, box);
+    ASSERT_TRUE(later.has_value());
+    EXPECT_EQ(later->kind, kind);
+    EXPECT_EQ(later->record.revision, 8);
+    EXPECT_FALSE(later->box.IsEmpty());
+  }
+  // "PRESENT" holds for any incarnation.
+  const std::optional<HullChange> present = AtCurrentState(
+      change_of(ChangeKind::kPresent, 5, 6), change_of(ChangeKind::kPresent, 7, 7).record, box);
+  ASSERT_TRUE(present.has_value());
+  EXPECT_EQ(present->record.create_revision, 7);
+}
 
 TEST_F(WatchHulls, ReportsAHullWithItsCountsAndItsBox) {
   Create("empty");

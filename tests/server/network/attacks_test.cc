@@ -5,6 +5,7 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_replace.h>
 #include <arpa/inet.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
@@ -94,6 +95,20 @@ const std::vector<Attack>& Attacks() {
          return Open(2 * i + 1) + FrameBytes(Frame::kResetStream, 0, 2 * i + 1, BigEndian(8));
        }},
       {"HalfOpenStreams", 1'000, [](uint32_t i) { return Open(2 * i + 1); }},
+      // One call for each stream, without waiting for any answer.
+      {"OpenStreams", 20'000,
+       [](uint32_t i) {
+         return FrameBytes(Frame::kHeaders, kEndHeadersFlag | kEndStreamFlag, 2 * i + 1,
+                           HeaderBlock(kCheckHealth));
+       }},
+      {"WindowUpdates", 2'000,
+       [](uint32_t) {
+         std::string frames;
+         for (int i = 0; i < 100; ++i) {
+           frames += FrameBytes(Frame::kWindowUpdate, 0, 0, BigEndian(1));
+         }
+         return frames;
+       }},
       {"Continuations", 2'000,
        [](uint32_t i) {
          return FrameBytes(i == 0 ? Frame::kHeaders : Frame::kContinuation, 0, 1,
@@ -143,6 +158,21 @@ TEST(Attacks, AConnectionThatAttacksIsClosed) {
   Process hulld({"--store", "memory", "--listen", "127.0.0.1:0"});
   const std::string address = AddressIn(hulld.ReadLineWith("listening on "));
   for (const Attack& attack : Attacks()) RunAttack(attack, address);
+}
+
+// gRPC logs metadata that it cannot parse.
+TEST(Attacks, AClientCannotForgeLinesOfTheLog) {
+  Process hulld({"--store", "memory", "--listen", "127.0.0.1:0"});
+  Attacker attacker(AddressIn(hulld.ReadLineWith("listening on ")));
+  ASSERT_TRUE(attacker.connected());
+  const std::string name = "grpc-timeout";
+  const std::string value = "1X\nforged \x1b[31m\xff";
+  std::string block = HeaderBlock(kCheckHealth) + '\0';
+  for (const std::string& text : {name, value}) block += static_cast<char>(text.size()) + text;
+  ASSERT_TRUE(attacker.Send(
+      kOpening + FrameBytes(Frame::kHeaders, kEndHeadersFlag | kEndStreamFlag, 1, block)));
+  EXPECT_THAT(hulld.ReadLineWith(name),
+              testing::EndsWith("value=1X\\u000aforged \\u001b[31m\\ufffd\n"));
 }
 
 // CVE-2023-4785: gRPC's own listener stops accepting after descriptors run out.

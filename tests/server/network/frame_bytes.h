@@ -15,6 +15,7 @@ enum class Frame : uint8_t {
   kResetStream = 3,
   kSettings = 4,
   kPing = 6,
+  kWindowUpdate = 8,
   kContinuation = 9,
 };
 inline constexpr uint8_t kEndStreamFlag = 1;

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "server/admin/doctor.h"
+#include "server/store/store_errors.h"
 #include "tests/server/harness/store_fixture.h"
 
 namespace hulld::server {
@@ -20,6 +21,7 @@ namespace store_loss_test {
 namespace fs = std::filesystem;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 class StoreLoss : public StoreTest {
  protected:
@@ -278,6 +280,136 @@ TEST_F(StoreLoss, ADamagedMarkIsRefused) {
   EXPECT_EQ((*store)->revision(), revision_);
 }
 
+// Tables, which only the manifest names, and a log that contains later changes.
+class ManifestLoss : public StoreLoss {
+ protected:
+  void SetUp() override {
+    StoreLoss::SetUp();
+    Start();
+    ASSERT_TRUE(hulls_->Put("in_table", CubeCorners()).ok());
+    // The next open moves the log into a table.
+    for (const char* id : {"in_newer_table", "in_log"}) {
+      hulls_ = nullptr;
+      Start();
+      ASSERT_TRUE(hulls_->Put(id, CubeCorners()).ok());
+    }
+    revision_ = hulls_->registry().Sizes().store_revision;
+    fs::copy(directory_ + "/data", Left(), fs::copy_options::recursive);
+    hulls_ = nullptr;
+    ASSERT_TRUE(fs::exists(Current()));
+    std::string name = Read(Current());
+    name.pop_back();
+    manifest_ = Left() + "/rocksdb/" + name;
+    ASSERT_TRUE(fs::exists(manifest_));
+  }
+  std::string Current() const { return Left() + "/rocksdb/CURRENT"; }
+
+  // Expects that neither a server nor the doctor opens the store or changes it.
+  void ExpectDamage(const std::string& finding, bool has_mark = true) {
+    const std::map<std::string, std::string> before = Files();
+    for (int attempt = 0; attempt < 2; ++attempt) {
+      const absl::Status refused = OpenStore("left").status();
+      EXPECT_EQ(refused.code(), absl::StatusCode::kDataLoss) << refused;
+      EXPECT_THAT(std::string(refused.message()),
+                  AllOf(HasSubstr(finding), HasSubstr("restore a backup")));
+      EXPECT_THAT(std::string(refused.message()), Not(HasSubstr("--accept-loss")));
+      if (has_mark) {
+        EXPECT_THAT(std::string(refused.message()),
+                    HasSubstr(absl::StrCat("revision ", revision_, " were acknowledged")));
+      }
+    }
+    for (const std::vector<std::string>& arguments :
+         {std::vector<std::string>{}, {"--accept-loss"}}) {
+      EXPECT_EQ(Doctor(arguments), 1);
+      EXPECT_THAT(doctor_output_, HasSubstr(finding));
+    }
+    EXPECT_EQ(Files(), before);
+  }
+
+  fs::path manifest_;
+};
+
+TEST_F(ManifestLoss, AnIntactStoreIsAccepted) {
+  for (int start = 0; start < 3; ++start) {
+    const absl::StatusOr<std::unique_ptr<RocksDbStore>> store = OpenStore("left");
+    ASSERT_TRUE(store.ok()) << store.status();
+    EXPECT_EQ((*store)->revision(), revision_);
+  }
+}
+
+// RocksDB would create an empty database in the directory, then replay the log and delete the
+// tables.
+TEST_F(ManifestLoss, AMissingCurrentIsRefused) {
+  fs::remove(Current());
+  ExpectDamage("the file CURRENT is missing");
+  fs::remove(Left() + "/hulld-log-mark");
+  ExpectDamage("the file CURRENT is missing", false);
+}
+
+TEST_F(ManifestLoss, ADamagedCurrentIsRefused) {
+  for (const char* const content : {"", "\n", "MANIFEST-", "MANIFEST-000001", "junk\n"}) {
+    Write(Current(), content);
+    ExpectDamage("the file CURRENT is damaged");
+  }
+  Write(Current(), "MANIFEST-999999\n");
+  ExpectDamage("the file MANIFEST-999999 is missing");
+  Write(Current(), "MANIFEST-000001\n");
+  ExpectDamage("the file CURRENT names MANIFEST-000001 instead of " +
+               manifest_.filename().string());
+}
+
+TEST_F(ManifestLoss, AMissingManifestIsRefused) {
+  fs::remove(manifest_);
+  ExpectDamage(manifest_.filename().string() + " is missing");
+}
+
+// RocksDB takes a truncated manifest for one whose last record was never written.
+TEST_F(ManifestLoss, AManifestTruncatedAnywhereIsRefused) {
+  const std::string content = Read(manifest_);
+  for (size_t size = 0; size < content.size(); ++size) {
+    Write(manifest_, content.substr(0, size));
+    const absl::Status refused = OpenStore("left").status();
+    EXPECT_EQ(refused.code(), absl::StatusCode::kDataLoss) << size << ": " << refused;
+  }
+  Write(manifest_, content.substr(0, content.size() - 20));
+  ExpectDamage(absl::StrCat(" has ", content.size() - 20, " bytes of ", content.size()));
+}
+
+TEST_F(ManifestLoss, AnOlderManifestIsRefused) {
+  const std::string content = Read(manifest_);
+  std::string changed = content;
+  changed[changed.size() / 2] ^= 1;
+  Write(manifest_, changed);
+  ExpectDamage("differ from what was written");
+}
+
+// A flush adds a record to the manifest of a running server.
+TEST_F(ManifestLoss, AFlushOfARunningServerIsInTheMark) {
+  fs::remove_all(Left());
+  Start();
+  ASSERT_TRUE(hulls_->store().db().Flush(rocksdb::FlushOptions()).ok());
+  ASSERT_TRUE(hulls_->Put("later", CubeCorners()).ok());
+  revision_ = hulls_->registry().Sizes().store_revision;
+  fs::copy(directory_ + "/data", Left(), fs::copy_options::recursive);
+  hulls_ = nullptr;
+  std::string name = Read(Current());
+  name.pop_back();
+  manifest_ = Left() + "/rocksdb/" + name;
+  const std::string content = Read(manifest_);
+  Write(manifest_, content.substr(0, content.size() - 1));
+  ExpectDamage(absl::StrCat(" has ", content.size() - 1, " bytes of ", content.size()));
+}
+
+TEST_F(ManifestLoss, AMissingTableIsRefused) {
+  for (const auto& entry : fs::directory_iterator(Left() + "/rocksdb")) {
+    if (entry.path().extension() == ".sst") fs::remove(entry.path());
+  }
+  EXPECT_EQ(OpenStore("left").status().code(), absl::StatusCode::kDataLoss);
+  EXPECT_EQ(Doctor({"--accept-loss"}), 1);
+  EXPECT_THAT(doctor_output_,
+              AllOf(HasSubstr("restore a backup"), Not(HasSubstr("--accept-loss"))));
+}
+
 TEST_F(StoreLoss, TheDoctorRefusesAStoreThatAServerHasOpen) {
   Start();
   ASSERT_TRUE(hulls_->Put("a", CubeCorners()).ok());
@@ -292,6 +424,18 @@ TEST_F(StoreLoss, TheDoctorRefusesAStoreThatAServerHasOpen) {
   EXPECT_TRUE(hulls_->Put("a", CubeCorners(2)).ok());
   // The attempt did not release the lock of the server.
   EXPECT_EQ(OpenStore().status().code(), absl::StatusCode::kFailedPrecondition);
+}
+
+// A path that contains "lock", and a lock file that cannot be opened, say nothing about servers.
+TEST_F(StoreLoss, OnlyALockThatIsHeldMeansThatAServerHasTheStoreOpen) {
+  RocksDbOptions options;
+  options.data_dir = directory_ + "/blocks.LOCK";
+  fs::create_directories(options.data_dir + "/rocksdb/LOCK");
+  const absl::Status unopened = RocksDbStore::Open(options).status();
+  EXPECT_EQ(unopened.code(), absl::StatusCode::kUnavailable) << unopened;
+  const absl::Status damaged = OpenError(
+      rocksdb::Status::Corruption("bad block in " + options.data_dir), options.data_dir, false);
+  EXPECT_EQ(damaged.code(), absl::StatusCode::kDataLoss) << damaged;
 }
 
 TEST_F(StoreLoss, AServerIsRefusedWhileTheDoctorRuns) {

@@ -70,6 +70,9 @@ async def read(call: Any) -> bytes | None:
         if _is_task_cancelled():
             raise
         raise CancelledError("the call was cancelled") from None
+    except UnboundLocalError:
+        # grpc 1.51 raises it if the task is cancelled just after the call has ended.
+        raise asyncio.CancelledError from None
     return None if message is grpc.aio.EOF else message
 
 
@@ -124,7 +127,8 @@ class Duplex:
                 end = from_status(code.name, await self._call.details() or "", trailing)
         except grpc.RpcError as error:
             end = from_rpc_error(error)
-        except asyncio.CancelledError:
+        except (asyncio.CancelledError, UnboundLocalError):
+            # UnboundLocalError: as in `read`.
             end = CancelledError("the call was cancelled")
         self._incoming.put_nowait((_END, end))
 
