@@ -253,7 +253,8 @@ absl::Status Server::Listen(const Config& config) {
   if (grpc_server_ == nullptr) return absl::InternalError("gRPC failed to start the server");
   address_ = address->Format(acceptor_->port());
   AddDescriptorsToMetrics();
-  const FrameLimits frames;
+  FrameLimits frames;
+  frames.all_half_open_bytes = MaxHalfOpenBytes(config);
   acceptor_->Start(std::move(connections), config.has_tls() ? nullptr : &frames);
   if (config.metrics_address.empty()) return absl::OkStatus();
   HULLD_ASSIGN_OR_RETURN(

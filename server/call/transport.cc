@@ -15,6 +15,11 @@ constexpr int kKeepaliveTimeoutMs = 20'000;
 
 }  // namespace
 
+uint64_t MaxHalfOpenBytes(const Config& config) {
+  return std::max(config.limits.request_memory / 8 * 3,
+                  kLargestMessages * config.limits.max_message_bytes);
+}
+
 void SetTransport(const Config& config, grpc::ServerBuilder& builder) {
   // Without this, a second server would silently share the port.
   builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
@@ -23,10 +28,10 @@ void SetTransport(const Config& config, grpc::ServerBuilder& builder) {
   builder.SetCompressionAlgorithmSupportStatus(GRPC_COMPRESS_GZIP, false);
   builder.SetMaxReceiveMessageSize(static_cast<int>(config.limits.max_message_bytes));
   // gRPC buffers a message before authentication, and many incomplete messages must not exhaust
-  // memory. Above this quota, gRPC slows down or ends their calls.
+  // memory. Above this quota, gRPC slows down or ends their calls, or crashes (frame_guard.h).
+  // Without TLS, half-open streams stay far below it.
   grpc::ResourceQuota quota("hulld");
-  quota.Resize(
-      std::max(config.limits.request_memory, kLargestMessages * config.limits.max_message_bytes));
+  quota.Resize(MaxHalfOpenBytes(config) / 3 * 8);
   builder.SetResourceQuota(quota);
   builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, Config::kCallsPerConnection);
   builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS,

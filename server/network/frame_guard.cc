@@ -64,6 +64,7 @@ FrameGuard::FrameGuard(const FrameLimits& limits, HalfOpenTotals& all_half_open,
       refilled_(now),
       control_{limits.control_frames * limits.first_share},
       resets_{limits.resets * limits.first_share},
+      late_data_{limits.late_data},
       large_headers_{limits.large_header_bytes * limits.first_share},
       window_updates_{limits.window_updates * limits.first_share} {}
 
@@ -83,6 +84,8 @@ void FrameGuard::Refill(Clock::time_point now) {
   control_.tokens = std::min(limits_.control_frames,
                              control_.tokens + passed * limits_.control_frames_per_second);
   resets_.tokens = std::min(limits_.resets, resets_.tokens + passed * limits_.resets_per_second);
+  late_data_.tokens =
+      std::min(limits_.late_data, late_data_.tokens + passed * limits_.late_data_per_second);
   large_headers_.tokens =
       std::min(limits_.large_header_bytes,
                large_headers_.tokens + passed * limits_.large_header_bytes_per_second);
@@ -199,10 +202,9 @@ FrameGuard::Verdict FrameGuard::BeginData(uint32_t stream, uint8_t flags) {
       data_stream_ = stream;
     }
   }
-  // gRPC reads DATA of ended and unknown streams faster than it returns to other connections.
+  if (is_padded || (payload_left_ == 0 && !ends)) return CountControlFrame();
   const bool is_open = std::find(open_.begin(), open_.end(), stream) != open_.end();
-  return is_padded || !is_open || (payload_left_ == 0 && !ends) ? CountControlFrame()
-                                                                : Verdict::kAllowed;
+  return is_open || late_data_.Take(1) ? Verdict::kAllowed : Verdict::kControlFrames;
 }
 
 void FrameGuard::TakeData(std::string_view bytes) {

@@ -25,6 +25,11 @@ struct FrameLimits {
   // PRIORITY, GOAWAY, CONTINUATION, trailers, empty or padded DATA, unknown types.
   double control_frames = 1000;
   double control_frames_per_second = 200;
+  // DATA of streams that are not open: gRPC reads it faster than it returns to other connections.
+  // The burst, which first_share does not reduce, covers what a client sends before it learns that
+  // the server has ended its upload.
+  double late_data = 1000;
+  double late_data_per_second = 1000;
   // Bytes of header blocks beyond kUsualHeaderBytes each.
   double large_header_bytes = 256 << 10;
   double large_header_bytes_per_second = 64 << 10;
@@ -35,8 +40,8 @@ struct FrameLimits {
   size_t half_open_streams = 100;
   size_t all_half_open_streams = 4096;
   // Bytes received of incomplete first messages of all connections. Above this, a connection with
-  // more than half_open_bytes of them is closed. gRPC has a quota of its own, but may crash when
-  // it is exhausted: its reclaimer then runs on a thread that has no gRPC context (**observed**).
+  // more than half_open_bytes of them is closed. gRPC has a quota of its own, but crashed twice
+  // when it was exhausted, in its reclaimer, on a thread without gRPC's context (**observed**).
   size_t all_half_open_bytes = 96 << 20;
   size_t half_open_bytes = 1 << 20;
   // Streams of a connection that the server has not ended. gRPC announces a limit of 100
@@ -44,7 +49,7 @@ struct FrameLimits {
   // late: it creates any number of streams first, each of 12 KB, and other connections wait for all
   // of them. Above 200, because the streams that end in a write are noted after the write.
   size_t open_streams = 256;
-  // Share of each burst that is available when the connection begins.
+  // Share of each burst, except late_data, that is available when the connection begins.
   double first_share = 1;
   // WINDOW_UPDATE frames. gRPC clients send two for every 16 KiB or more that they read.
   double window_updates = 50'000;
@@ -172,6 +177,7 @@ class FrameGuard {
   Clock::time_point refilled_;
   Bucket control_;
   Bucket resets_;
+  Bucket late_data_;
   Bucket large_headers_;
   Bucket window_updates_;
 };

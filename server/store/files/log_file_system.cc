@@ -44,14 +44,19 @@ class LogFileSystem::Directory : public rocksdb::FSDirectoryWrapper {
       : FSDirectoryWrapper(std::move(directory)), system_(system) {}
 
   IOStatus Fsync(const IOOptions& options, IODebugContext* debug) override {
-    return system_.NoteSync(FSDirectoryWrapper::Fsync(options, debug));
+    return NoteSynced(FSDirectoryWrapper::Fsync(options, debug));
   }
   IOStatus FsyncWithDirOptions(const IOOptions& options, IODebugContext* debug,
                                const rocksdb::DirFsyncOptions& directory) override {
-    return system_.NoteSync(FSDirectoryWrapper::FsyncWithDirOptions(options, debug, directory));
+    return NoteSynced(FSDirectoryWrapper::FsyncWithDirOptions(options, debug, directory));
   }
 
  private:
+  IOStatus NoteSynced(const IOStatus& status) {
+    if (status.ok()) system_.NoteCurrent();
+    return system_.NoteSync(status);
+  }
+
   LogFileSystem& system_;
 };
 
@@ -270,18 +275,23 @@ void LogFileSystem::NoteManifest(uint64_t number, const LogMark::Synced& synced)
   if (mark_file_ != nullptr) WriteMark();
 }
 
-// RocksDB syncs a new manifest before it renames a file to CURRENT that names it.
 IOStatus LogFileSystem::RenameFile(const std::string& from, const std::string& to,
                                    const IOOptions& options, IODebugContext* debug) {
   const IOStatus renamed = FileSystemWrapper::RenameFile(from, to, options, debug);
-  if (!renamed.ok() || to != CurrentPath(directory_)) return renamed;
+  if (renamed.ok() && to == CurrentPath(directory_)) is_current_new_ = true;
+  return renamed;
+}
+
+// RocksDB syncs a new manifest, renames a file that names it to CURRENT, and syncs the directory.
+// Only then does a power failure leave the new manifest in force.
+void LogFileSystem::NoteCurrent() {
+  if (!is_current_new_.exchange(false)) return;
   const absl::StatusOr<std::optional<uint64_t>> current = ReadCurrent(*target(), directory_);
   const std::lock_guard lock(mutex_);
-  if (!current.ok() || *current != newest_manifest_) return renamed;
+  if (!current.ok() || *current != newest_manifest_) return;
   mark_.manifest = newest_manifest_;
   mark_.manifest_synced = newest_manifest_synced_;
   if (mark_file_ != nullptr) WriteMark();
-  return renamed;
 }
 
 IOStatus LogFileSystem::NewDirectory(const std::string& name, const IOOptions& options,

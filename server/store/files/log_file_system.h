@@ -94,6 +94,8 @@ class LogFileSystem : public rocksdb::FileSystemWrapper {
   rocksdb::IOStatus Cut(const std::string& name, const LogState& log);
   // Adds the synced bytes of a manifest to the mark if CURRENT names it.
   void NoteManifest(uint64_t number, const LogMark::Synced& synced);
+  // Puts a manifest that CURRENT newly names into the mark. Call after the directory was synced.
+  void NoteCurrent();
   // Removes a log from the mark, before the log is deleted.
   rocksdb::IOStatus Forget(const std::string& name);
   // The following require the mutex.
@@ -103,6 +105,8 @@ class LogFileSystem : public rocksdb::FileSystemWrapper {
   const std::string directory_;
   std::function<rocksdb::IOStatus()> locked_;
   std::atomic<uint64_t> failed_syncs_ = 0;
+  // True if CURRENT was renamed and the directory not synced since.
+  std::atomic<bool> is_current_new_ = false;
 
   mutable std::mutex mutex_;
   // Guarded by the mutex.

@@ -221,6 +221,21 @@ TEST_F(FrameGuardTest, TheRateOfLargeHeaderBlocksIsBounded) {
   EXPECT_EQ(send_large(stream), Verdict::kLargeHeaders);
 }
 
+// An upload that the server ended may be ahead by a window of frames, also on a new connection of a
+// client that reconnects often.
+TEST_F(FrameGuardTest, TheRateOfDataAfterTheEndOfAStreamIsBounded) {
+  FrameLimits limits;
+  limits.first_share = 0.05;
+  FrameGuard guard(limits, all_half_open_, now_);
+  ASSERT_EQ(guard.Take(kOpening + Open(1), now_), Verdict::kAllowed);
+  guard.TakeSent(FrameBytes(Frame::kHeaders, kEndHeadersFlag | kEndStreamFlag, 1, "trailers"));
+  const std::string late = FrameBytes(Frame::kData, 0, 1, std::string(100, 'x'));
+  for (int i = 0; i < 1000; ++i) ASSERT_EQ(guard.Take(late, now_), Verdict::kAllowed);
+  now_ += std::chrono::seconds(1);
+  for (int i = 0; i < 1000; ++i) ASSERT_EQ(guard.Take(late, now_), Verdict::kAllowed);
+  EXPECT_EQ(guard.Take(late, now_), Verdict::kControlFrames);
+}
+
 TEST_F(FrameGuardTest, TheRateOfControlFramesIsBounded) {
   for (const std::string& frame :
        {FrameBytes(Frame::kPing, 0, 0, "12345678"), FrameBytes(Frame::kSettings, 0, 0, ""),
