@@ -7,6 +7,7 @@
 
 #include "core/base/check.h"
 #include "server/contract/errors.h"
+#include "server/registry/catalog/body.h"
 #include "server/registry/catalog/hull_table.h"
 
 namespace hulld::server {
