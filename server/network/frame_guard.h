@@ -18,7 +18,7 @@ struct FrameLimits {
   // KiB, but parses any number of bytes first.
   size_t header_block_bytes = 16 << 10;
   // RST_STREAM frames. Each costs gRPC 100 to 200 us (**observed**). The burst covers a client that
-  // cancels all of its calls; the rate, one whose calls exceed short deadlines.
+  // cancels all of its calls; the rate, a client with short deadlines.
   double resets = 256;
   double resets_per_second = 500;
   // Other frames without a request that gRPC answers or allocates memory for: PING, SETTINGS,
@@ -26,8 +26,8 @@ struct FrameLimits {
   double control_frames = 1000;
   double control_frames_per_second = 200;
   // DATA of streams that are not open: gRPC reads it faster than it returns to other connections.
-  // The burst, which first_share does not reduce, covers what a client sends before it learns that
-  // the server has ended its upload.
+  // The burst, which first_share does not reduce, covers the data in flight when the server ends an
+  // upload.
   double late_data = 1000;
   double late_data_per_second = 1000;
   // Bytes of header blocks beyond kUsualHeaderBytes each.
@@ -74,7 +74,7 @@ class BurstShares {
   double Draw(const Network& network, Clock::time_point now);
 
  private:
-  // Full bursts at once and per second.
+  // Number of full bursts available immediately, and per second.
   static constexpr double kFull = 8;
   static constexpr double kFullPerSecond = 1;
   // Covers the first frames of any client: 50 control frames.

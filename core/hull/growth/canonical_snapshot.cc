@@ -244,8 +244,8 @@ class FaceCollector {
     const size_t end = surface_.id_bound();
     for (TriangleId id = 0; id < end; ++id) {
       if (poll.Step()) return;
-      // Triangles are prefetched first, then what they refer to: neighbors, vertices, and ranks,
-      // which are scattered in memory. Not a function, because compilers drop calls without effect.
+      // Prefetches triangles first, then their neighbors, vertices, and ranks, which are scattered
+      // in memory. Not a function, because compilers drop calls without effect.
       if (const size_t ahead = id + 2 * kAhead; ahead < end) {
         __builtin_prefetch(&surface_.triangle(static_cast<TriangleId>(ahead)));
       }

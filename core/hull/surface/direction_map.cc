@@ -117,9 +117,9 @@ Vector DirectionMap::CornerDirection(int face, int i, int j) const {
 //
 // max g is at most 1 / least reach, the least gauge 1 / largest reach. Relative to the computed
 // value the total is at most ratio (16 stretch u0 + 18 u1), with ratio = largest / least reach and
-// stretch = |L| (E + |c|) / least reach; 20 u1 leaves slack. An error e is covered by a limit of
-// 1 - 2 e, whose rounding to a float is below e. Within kMapMinDistance and kMapMaxDistance,
-// underflow adds less than the slack. Proven.
+// stretch = |L| (E + |c|) / least reach; 20 u1 leaves slack. A limit of 1 - 2 e covers an
+// error e, because rounding it to a float changes it by less than e. Within kMapMinDistance and
+// kMapMaxDistance, underflow adds less than the slack. Proven.
 void DirectionMap::Finish(double min_reach, double largest_reach, double extent) {
   HULLD_CHECK(gauges_.size() == corner_count() && hints_.size() == cell_count());
   if (!(min_reach >= kMapMinDistance && largest_reach <= kMapMaxDistance)) return;
