@@ -160,8 +160,8 @@ class DirectionMap {
   MapFrame frame_;
   int n_;
   double half_;
-  // A point is inside if its distance times its gauge, in floats, is below this limit. 0 if rounding
-  // could matter.
+  // A point is inside if its distance times its gauge, in floats, is below this. 0: rounding could
+  // matter.
   float limit_ = 0;
   // By corner: the gauge of its direction.
   std::vector<float> gauges_;
