@@ -65,6 +65,7 @@ Eigen::Matrix3d MapFrame::matrix() const {
 }
 
 Vector MapFrame::FromMap(const Vector& direction) const {
+  if (is_plain_) return direction / entries_[0];
   const auto& [xx, yx, yy, zx, zy, zz] = entries_;
   const double x = direction.x() / xx;
   const double y = (direction.y() - yx * x) / yy;
