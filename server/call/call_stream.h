@@ -249,7 +249,7 @@ class PulledStream : public CallStream<Reactor> {
   bool writing_ = false;
 };
 
-// A stream that queues its replies. Any thread may add replies; they are written one at a time, in
+// A stream that queues its replies. Any thread may add replies; they are written one by one, in
 // order. One mutex guards the state. Reads, writes, and the end of the call are started with the
 // mutex held; gRPC calls back without it.
 //

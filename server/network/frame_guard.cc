@@ -1,7 +1,6 @@
 #include "server/network/frame_guard.h"
 
 #include <algorithm>
-#include <span>
 
 namespace hulld::server {
 namespace {
@@ -18,16 +17,6 @@ enum FrameType : uint8_t {
 };
 constexpr uint8_t kEndStream = 0x1;
 constexpr uint8_t kPadded = 0x8;
-
-// Fields of a frame header.
-size_t LengthOf(std::span<const uint8_t> header) {
-  return size_t{header[0]} << 16 | size_t{header[1]} << 8 | header[2];
-}
-
-uint32_t StreamOf(std::span<const uint8_t> header) {
-  return uint32_t{header[5] & 0x7fu} << 24 | uint32_t{header[6]} << 16 | uint32_t{header[7]} << 8 |
-         header[8];
-}
 
 }  // namespace
 
@@ -93,29 +82,44 @@ void FrameGuard::Refill(Clock::time_point now) {
       limits_.window_updates, window_updates_.tokens + passed * limits_.window_updates_per_second);
 }
 
+uint32_t FrameGuard::Frame::stream() const {
+  return uint32_t{header[5] & 0x7fu} << 24 | uint32_t{header[6]} << 16 | uint32_t{header[7]} << 8 |
+         header[8];
+}
+
+std::string_view FrameGuard::Frame::TakePayload(std::string_view& bytes) {
+  const std::string_view payload = bytes.substr(0, payload_left);
+  payload_left -= payload.size();
+  bytes.remove_prefix(payload.size());
+  return payload;
+}
+
+bool FrameGuard::Frame::TakeHeader(std::string_view& bytes) {
+  const size_t taken = std::min(kHeaderBytes - header_bytes, bytes.size());
+  std::copy_n(bytes.begin(), taken, header.begin() + header_bytes);
+  bytes.remove_prefix(taken);
+  header_bytes += taken;
+  if (header_bytes < kHeaderBytes) return false;
+  header_bytes = 0;
+  payload_left = size_t{header[0]} << 16 | size_t{header[1]} << 8 | header[2];
+  return true;
+}
+
 FrameGuard::Verdict FrameGuard::Take(std::string_view bytes, Clock::time_point now) {
   Refill(now);
   while (!bytes.empty()) {
-    size_t taken = 0;
     if (preface_left_ > 0) {
-      taken = std::min(preface_left_, bytes.size());
+      const size_t taken = std::min(preface_left_, bytes.size());
       const std::string_view expected = kPreface.substr(kPreface.size() - preface_left_, taken);
       if (bytes.substr(0, taken) != expected) return Verdict::kNotHttp2;
       preface_left_ -= taken;
-    } else if (payload_left_ > 0) {
-      taken = std::min(payload_left_, bytes.size());
-      if (data_stream_ != 0) TakeData(bytes.substr(0, taken));
-      payload_left_ -= taken;
-    } else {
-      taken = std::min(kFrameHeaderBytes - header_bytes_, bytes.size());
-      std::copy_n(bytes.begin(), taken, header_.begin() + header_bytes_);
-      header_bytes_ += taken;
-      if (header_bytes_ == kFrameHeaderBytes) {
-        header_bytes_ = 0;
-        if (const Verdict verdict = BeginFrame(); verdict != Verdict::kAllowed) return verdict;
-      }
+      bytes.remove_prefix(taken);
+    } else if (received_.payload_left > 0) {
+      const std::string_view payload = received_.TakePayload(bytes);
+      if (data_stream_ != 0) TakeData(payload);
+    } else if (received_.TakeHeader(bytes)) {
+      if (const Verdict verdict = BeginFrame(); verdict != Verdict::kAllowed) return verdict;
     }
-    bytes.remove_prefix(taken);
   }
   // Checked per read rather than per frame: a client writes headers and message together, so a
   // connection that leaves streams half-open between two reads is unusual.
@@ -128,33 +132,22 @@ FrameGuard::Verdict FrameGuard::Take(std::string_view bytes, Clock::time_point n
 
 void FrameGuard::TakeSent(std::string_view bytes) {
   while (!bytes.empty()) {
-    size_t taken = 0;
-    if (sent_payload_left_ > 0) {
-      taken = std::min(sent_payload_left_, bytes.size());
-      sent_payload_left_ -= taken;
-    } else {
-      taken = std::min(kFrameHeaderBytes - sent_header_bytes_, bytes.size());
-      std::copy_n(bytes.begin(), taken, sent_header_.begin() + sent_header_bytes_);
-      sent_header_bytes_ += taken;
-      if (sent_header_bytes_ == kFrameHeaderBytes) {
-        sent_header_bytes_ = 0;
-        sent_payload_left_ = LengthOf(sent_header_);
-        const uint8_t type = sent_header_[3];
-        const bool ends = type == kResetStream || ((type == kData || type == kHeaders) &&
-                                                   (sent_header_[4] & kEndStream) != 0);
-        if (ends) End(StreamOf(sent_header_));
-      }
+    if (sent_.payload_left > 0) {
+      sent_.TakePayload(bytes);
+    } else if (sent_.TakeHeader(bytes)) {
+      const uint8_t type = sent_.type();
+      const bool ends = type == kResetStream ||
+                        ((type == kData || type == kHeaders) && (sent_.flags() & kEndStream) != 0);
+      if (ends) End(sent_.stream());
     }
-    bytes.remove_prefix(taken);
   }
 }
 
 FrameGuard::Verdict FrameGuard::BeginFrame() {
-  payload_left_ = LengthOf(header_);
   data_stream_ = 0;
-  const uint8_t flags = header_[4];
-  const uint32_t stream = StreamOf(header_);
-  switch (header_[3]) {
+  const uint8_t flags = received_.flags();
+  const uint32_t stream = received_.stream();
+  switch (received_.type()) {
     case kData:
       return BeginData(stream, flags);
     case kHeaders:
@@ -164,7 +157,6 @@ FrameGuard::Verdict FrameGuard::BeginFrame() {
       if (const Verdict verdict = AddHeaderBytes(); verdict != Verdict::kAllowed) return verdict;
       return CountControlFrame();
     case kResetStream:
-      if (const auto found = Find(stream); found != half_open_.end()) Close(found);
       End(stream);
       return resets_.Take(1) ? Verdict::kAllowed : Verdict::kControlFrames;
     case kWindowUpdate:
@@ -202,7 +194,7 @@ FrameGuard::Verdict FrameGuard::BeginData(uint32_t stream, uint8_t flags) {
       data_stream_ = stream;
     }
   }
-  if (is_padded || (payload_left_ == 0 && !ends)) return CountControlFrame();
+  if (is_padded || (received_.payload_left == 0 && !ends)) return CountControlFrame();
   const bool is_open = std::find(open_.begin(), open_.end(), stream) != open_.end();
   return is_open || late_data_.Take(1) ? Verdict::kAllowed : Verdict::kControlFrames;
 }
@@ -233,7 +225,7 @@ FrameGuard::Verdict FrameGuard::AddHeaderBytes() {
     return static_cast<double>(bytes - std::min(bytes, FrameLimits::kUsualHeaderBytes));
   };
   const double before = beyond(block_bytes_);
-  block_bytes_ += payload_left_;
+  block_bytes_ += received_.payload_left;
   if (block_bytes_ > limits_.header_block_bytes) return Verdict::kHeaderBlock;
   return large_headers_.Take(beyond(block_bytes_) - before) ? Verdict::kAllowed
                                                             : Verdict::kLargeHeaders;
@@ -257,6 +249,7 @@ void FrameGuard::Close(std::vector<HalfOpen>::iterator stream) {
 }
 
 void FrameGuard::End(uint32_t stream) {
+  if (const auto half_open = Find(stream); half_open != half_open_.end()) Close(half_open);
   const auto found = std::find(open_.begin(), open_.end(), stream);
   if (found == open_.end()) return;
   *found = open_.back();

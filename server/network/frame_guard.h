@@ -140,7 +140,21 @@ class FrameGuard {
     int prefix_left = kPrefixBytes;
   };
   static constexpr int kPrefixBytes = 5;
-  static constexpr size_t kFrameHeaderBytes = 9;
+  // The current frame in one direction: its header, and the number of payload bytes left.
+  struct Frame {
+    static constexpr size_t kHeaderBytes = 9;
+    std::array<uint8_t, kHeaderBytes> header{};
+    size_t header_bytes = 0;
+    size_t payload_left = 0;
+
+    uint8_t type() const { return header[3]; }
+    uint8_t flags() const { return header[4]; }
+    uint32_t stream() const;
+    // Removes the rest of the payload, as far as it is there, from `bytes`, and returns it.
+    std::string_view TakePayload(std::string_view& bytes);
+    // The same for the next header. Returns true if it is complete. Requires: no payload is left.
+    bool TakeHeader(std::string_view& bytes);
+  };
 
   Verdict BeginFrame();
   Verdict BeginHeaders(uint32_t stream, bool ends);
@@ -151,7 +165,7 @@ class FrameGuard {
   void TakeData(std::string_view bytes);
   std::vector<HalfOpen>::iterator Find(uint32_t stream);
   void Close(std::vector<HalfOpen>::iterator stream);
-  // Removes an open stream, if it is open.
+  // Removes a stream from the open and the half-open ones, if it is among them.
   void End(uint32_t stream);
   void Refill(Clock::time_point now);
 
@@ -160,20 +174,14 @@ class FrameGuard {
   // Bytes of half_open_.
   size_t half_open_bytes_ = 0;
   size_t preface_left_;
-  std::array<uint8_t, kFrameHeaderBytes> header_{};
-  size_t header_bytes_ = 0;
-  // Remaining bytes of the current frame.
-  size_t payload_left_ = 0;
+  Frame received_;
   // Stream of the DATA payload; 0: other payload.
   uint32_t data_stream_ = 0;
   size_t block_bytes_ = 0;
   uint32_t last_stream_ = 0;
   std::vector<HalfOpen> half_open_;
   std::vector<uint32_t> open_;
-  // The server's replies.
-  std::array<uint8_t, kFrameHeaderBytes> sent_header_{};
-  size_t sent_header_bytes_ = 0;
-  size_t sent_payload_left_ = 0;
+  Frame sent_;
   Clock::time_point refilled_;
   Bucket control_;
   Bucket resets_;

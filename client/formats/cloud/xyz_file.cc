@@ -83,7 +83,7 @@ absl::Status CheckColumns(const ByteSource& source, std::string_view row, size_t
 }  // namespace
 
 absl::Status ReadXyz(ByteSource* source, PointCollector* points) {
-  // Of the current scan: the number of points declared, if any, and read, and the columns.
+  // The current scan: its declared number of points, if any, the number read, and its columns.
   std::optional<uint64_t> declared;
   uint64_t found = 0;
   size_t columns = 0;

@@ -361,9 +361,6 @@ def test_a_watch_that_cannot_read_an_answer_ends_its_call() -> None:
     assert cancelled.is_set()
 
 
-# --- Errors ---
-
-
 def test_a_task_cancelled_just_after_its_call_ended_is_cancelled() -> None:
     class EndedCall:
         async def read(self) -> bytes:
@@ -371,7 +368,7 @@ def test_a_task_cancelled_just_after_its_call_ended_is_cancelled() -> None:
                 await asyncio.Event().wait()
             except asyncio.CancelledError:
                 pass
-            # What grpc 1.51 does: it uses a variable that it has not set.
+            # As grpc 1.51, which then reads a variable that it has not set.
             raise UnboundLocalError("raw_response")
 
     async def cancel_a_read() -> None:
@@ -383,6 +380,9 @@ def test_a_task_cancelled_just_after_its_call_ended_is_cancelled() -> None:
         assert reading.cancelled()
 
     asyncio.run(cancel_a_read())
+
+
+# --- Errors ---
 
 
 def test_an_error_has_the_class_of_its_status() -> None:

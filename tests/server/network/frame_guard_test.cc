@@ -62,6 +62,13 @@ TEST_F(FrameGuardTest, AStreamIsHalfOpenUntilItsFirstMessageIsComplete) {
   EXPECT_EQ(guard_.half_open_streams(), 0);
   ASSERT_EQ(Send(Open(7) + FrameBytes(Frame::kData, 0, 7, MessageBytes(""))), Verdict::kAllowed);
   EXPECT_EQ(all_half_open_.streams, 0);
+  // The server may refuse a call before its message is complete.
+  ASSERT_EQ(Send(Open(9) + FrameBytes(Frame::kData, 0, 9, message.substr(0, 7))),
+            Verdict::kAllowed);
+  EXPECT_EQ(all_half_open_.bytes, 2);
+  guard_.TakeSent(FrameBytes(Frame::kHeaders, kEndHeadersFlag | kEndStreamFlag, 9, "trailers"));
+  EXPECT_EQ(all_half_open_.streams, 0);
+  EXPECT_EQ(all_half_open_.bytes, 0);
 }
 
 TEST_F(FrameGuardTest, HalfOpenStreamsAreBoundedByConnectionAndInTotal) {

@@ -375,7 +375,7 @@ TEST_F(ManifestLoss, AManifestTruncatedAnywhereIsRefused) {
   ExpectDamage(absl::StrCat(" has ", content.size() - 20, " bytes of ", content.size()));
 }
 
-TEST_F(ManifestLoss, AnOlderManifestIsRefused) {
+TEST_F(ManifestLoss, AChangedManifestIsRefused) {
   const std::string content = Read(manifest_);
   std::string changed = content;
   changed[changed.size() / 2] ^= 1;
