@@ -87,7 +87,7 @@ run_tests() {
   # Many tests wait for a disk or another process: with one more job than processors, a third of the
   # processor time was idle.
   ctest --preset "$preset" --parallel $((2 * jobs)) "$@" | tee "build/$preset/ctest.log" || code=1
-  grep -hE '^\[  SKIPPED \] [^ ]+( \(|$)' "build/$preset/Testing/Temporary/LastTest.log" | sort -u
+  sed -n -E 's/^(\[  SKIPPED \] [^ ]+)( \([0-9]+ ms\))?$/\1/p' "build/$preset/Testing/Temporary/LastTest.log" | sort -u
   echo "slowest:"
   sed -n -E 's/^ *[0-9]+\/[0-9]+ Test +#[0-9]+: ([^ ]+) .* ([0-9.]+) sec.*/\2 s  \1/p' "build/$preset/ctest.log" |
     sort -rn | sed -n '1,10s/^/  /p'

@@ -3,8 +3,9 @@
 
 namespace hulld {
 
-// Returns the size of a test: `full`, or `sanitized` in sanitized builds. These are about ten times
-// slower and look for invalid accesses and arithmetic on each path, for which fewer inputs suffice.
+// Returns the size of a test, or a number that depends on it: `full`, or `sanitized` in sanitized
+// builds. These are about ten times slower and look for invalid accesses and arithmetic on each
+// path, for which fewer inputs suffice.
 #ifdef HULLD_SANITIZED
 constexpr int TestSize(int /*full*/, int sanitized) { return sanitized; }
 #else

@@ -7,14 +7,12 @@
 #include <random>
 #include <vector>
 
+#include "tests/test_size.h"
+
 namespace hulld::oracle {
 namespace brute_force_relation_test {
 
-#ifdef HULLD_SANITIZED
-constexpr int kRounds = 1000;
-#else
-constexpr int kRounds = 10000;
-#endif
+constexpr int kRounds = TestSize(10000, 1000);
 
 constexpr double kDenormal = 5e-324;
 

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "tests/oracle/brute_force_relation.h"
+#include "tests/test_size.h"
 
 namespace hulld {
 namespace certificate_check_test {
@@ -293,11 +294,7 @@ TEST(CertificateCheck, RejectsFalseCertificates) {
   std::uniform_int_distribution<int> lattice(-1, 1);
   std::uniform_int_distribution<int> size(1, 7);
   int accepted[4] = {};
-#ifdef HULLD_SANITIZED
-  constexpr int kScenes = 500;
-#else
-  constexpr int kScenes = 4'000;
-#endif
+  constexpr int kScenes = TestSize(4'000, 500);
   for (int scene = 0; scene < kScenes; ++scene) {
     Hull hulls[2];
     std::vector<oracle::Point> points[2];

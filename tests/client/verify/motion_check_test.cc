@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "tests/oracle/brute_force_relation.h"
+#include "tests/test_size.h"
 
 namespace hulld {
 namespace motion_check_test {
@@ -585,11 +586,7 @@ TEST(MotionCheck, RejectsFalseIntervals) {
   std::mt19937 random(kSeed);
   std::uniform_int_distribution<int> lattice(-2, 2);
   std::uniform_int_distribution<int> size(1, 5);
-#ifdef HULLD_SANITIZED
-  constexpr int kScenes = 1'000;
-#else
-  constexpr int kScenes = 8'000;
-#endif
+  constexpr int kScenes = TestSize(8'000, 1'000);
   int accepted = 0;
   int turning = 0;
   for (int scene = 0; scene < kScenes; ++scene) {

@@ -14,6 +14,7 @@
 #include "tests/core/checks/oracle_bridge.h"
 #include "tests/core/checks/point_sets.h"
 #include "tests/oracle/brute_force_hausdorff.h"
+#include "tests/test_size.h"
 
 namespace hulld {
 namespace simplification_check_test {
@@ -24,13 +25,8 @@ constexpr auto kInside = v1::SIMPLIFICATION_SIDE_INSIDE;
 constexpr auto kOutside = v1::SIMPLIFICATION_SIDE_OUTSIDE;
 constexpr double kLeast = std::numeric_limits<double>::denorm_min();
 
-#ifdef HULLD_SANITIZED
-constexpr int kManyPoints = 1000;
-constexpr int kRounds = 10;
-#else
-constexpr int kManyPoints = 20'000;
-constexpr int kRounds = 60;
-#endif
+constexpr int kManyPoints = TestSize(20'000, 1000);
+constexpr int kRounds = TestSize(60, 10);
 
 v1::Simplification Requested(v1::SimplificationSide side, uint64_t max_vertices,
                              double max_error = 0) {

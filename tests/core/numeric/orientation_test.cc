@@ -278,7 +278,7 @@ TEST(Orient3d, ExactAtTheEdgeOfFixedSize) {
   const double values[] = {0x1p60 - 0x1p8, -(0x1p60 - 0x1p8), 0x1p60, 1, -1, 0.5};
   const OrientationCounts before = ThreadOrientationCounts();
   for (const int scale : {-1070, -60, 0, 900}) {
-    for (int i = 0; i < 10000; ++i) {
+    for (int i = 0; i < TestSize(10000, 2000); ++i) {
       Points p;
       for (Vector& v : p) {
         for (int k = 0; k < 3; ++k) v[k] = std::ldexp(values[pick(random)], scale);
@@ -287,8 +287,8 @@ TEST(Orient3d, ExactAtTheEdgeOfFixedSize) {
     }
   }
   const OrientationCounts after = ThreadOrientationCounts();
-  EXPECT_GT(after.fixed_point - before.fixed_point, 100u) << "seed " << seed;
-  EXPECT_GT(after.expansion - before.expansion, 100u) << "seed " << seed;
+  EXPECT_GT(after.fixed_point - before.fixed_point, uint64_t{TestSize(100, 10)}) << "seed " << seed;
+  EXPECT_GT(after.expansion - before.expansion, uint64_t{TestSize(100, 10)}) << "seed " << seed;
 }
 
 TEST(Orient3d, ExactOnMixedMagnitudes) {

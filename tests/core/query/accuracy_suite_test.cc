@@ -8,18 +8,14 @@
 
 #include "core/query/collision.h"
 #include "tests/core/checks/oracle_bridge.h"
+#include "tests/test_size.h"
 
 namespace hulld {
 namespace accuracy_suite_test {
 
 TEST(AccuracySuite, EveryQueryIsAnsweredExactly) {
-#ifdef HULLD_SANITIZED
-  constexpr size_t kStride = 11;
-  constexpr size_t kQueries = 422;
-#else
-  constexpr size_t kStride = 1;
-  constexpr size_t kQueries = 4640;
-#endif
+  constexpr size_t kStride = TestSize(1, 11);
+  constexpr size_t kQueries = TestSize(4640, 422);
   const bench::AccuracySuite suite = bench::MakeAccuracySuite(kStride);
   ASSERT_EQ(suite.queries.size(), kQueries);
   std::map<Relation, size_t> relations;

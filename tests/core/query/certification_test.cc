@@ -10,15 +10,12 @@
 #include "tests/core/checks/certificate_bridge.h"
 #include "tests/core/checks/oracle_bridge.h"
 #include "tests/core/checks/point_sets.h"
+#include "tests/test_size.h"
 
 namespace hulld {
 namespace certification_test {
 
-#ifdef HULLD_SANITIZED
-constexpr int kRounds = 300;
-#else
-constexpr int kRounds = 4000;
-#endif
+constexpr int kRounds = TestSize(4000, 300);
 
 QueryOptions WantCertificate() {
   QueryOptions options;

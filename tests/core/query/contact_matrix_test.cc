@@ -9,17 +9,13 @@
 #include "tests/core/checks/oracle_bridge.h"
 #include "tests/core/checks/point_sets.h"
 #include "tests/core/checks/relation_check.h"
+#include "tests/test_size.h"
 
 namespace hulld {
 namespace contact_matrix_test {
 
-#ifdef HULLD_SANITIZED
-constexpr int kStride = 23;
-constexpr int kFlatRounds = 600;
-#else
-constexpr int kStride = 1;
-constexpr int kFlatRounds = 2400;
-#endif
+constexpr int kStride = TestSize(1, 23);
+constexpr int kFlatRounds = TestSize(2400, 600);
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 

@@ -13,15 +13,12 @@
 #include "tests/core/checks/extreme_clouds.h"
 #include "tests/core/checks/oracle_bridge.h"
 #include "tests/core/checks/point_sets.h"
+#include "tests/test_size.h"
 
 namespace hulld {
 namespace determinism_test {
 
-#ifdef HULLD_SANITIZED
-constexpr size_t kStride = 37;
-#else
-constexpr size_t kStride = 5;
-#endif
+constexpr size_t kStride = TestSize(5, 37);
 
 // Selects a SIMD path and restores the previous one on destruction.
 class OnPath {

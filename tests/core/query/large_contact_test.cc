@@ -8,17 +8,13 @@
 #include "tests/core/checks/oracle_bridge.h"
 #include "tests/core/checks/point_sets.h"
 #include "tests/core/checks/relation_check.h"
+#include "tests/test_size.h"
 
 namespace hulld {
 namespace large_contact_test {
 
-#ifdef HULLD_SANITIZED
-constexpr int kSphereVertices = 400;
-constexpr int kParaboloidRadius = 7;
-#else
-constexpr int kSphereVertices = 1500;
-constexpr int kParaboloidRadius = 19;
-#endif
+constexpr int kSphereVertices = TestSize(1500, 400);
+constexpr int kParaboloidRadius = TestSize(19, 7);
 
 std::vector<Vector> Reflected(std::span<const Vector> points) {
   std::vector<Vector> result;

@@ -10,17 +10,13 @@
 #include "tests/core/checks/oracle_bridge.h"
 #include "tests/core/checks/point_sets.h"
 #include "tests/core/checks/relation_check.h"
+#include "tests/test_size.h"
 
 namespace hulld {
 namespace near_contact_test {
 
-#ifdef HULLD_SANITIZED
-constexpr int kRounds = 30;
-constexpr int kStride = 37;
-#else
-constexpr int kRounds = 600;
-constexpr int kStride = 1;
-#endif
+constexpr int kRounds = TestSize(600, 30);
+constexpr int kStride = TestSize(1, 37);
 
 Relation Query(const Hull& a, const Pose& X_WA, const Hull& b, const Pose& X_WB) {
   return CheckCollision(a, X_WA, b, X_WB).value().relation;

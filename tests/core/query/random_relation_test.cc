@@ -10,15 +10,12 @@
 #include "tests/core/checks/oracle_bridge.h"
 #include "tests/core/checks/point_sets.h"
 #include "tests/core/checks/relation_check.h"
+#include "tests/test_size.h"
 
 namespace hulld {
 namespace random_relation_test {
 
-#ifdef HULLD_SANITIZED
-constexpr int kRounds = 2000;
-#else
-constexpr int kRounds = 20000;
-#endif
+constexpr int kRounds = TestSize(20000, 2000);
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 

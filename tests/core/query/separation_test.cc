@@ -11,17 +11,13 @@
 #include "tests/core/checks/oracle_bridge.h"
 #include "tests/core/checks/point_sets.h"
 #include "tests/core/checks/separation_check.h"
+#include "tests/test_size.h"
 
 namespace hulld {
 namespace separation_test {
 
-#ifdef HULLD_SANITIZED
-constexpr int kRounds = 240;
-constexpr int kLargeRounds = 4;
-#else
-constexpr int kRounds = 1200;
-constexpr int kLargeRounds = 40;
-#endif
+constexpr int kRounds = TestSize(1200, 240);
+constexpr int kLargeRounds = TestSize(40, 4);
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kLargest = std::numeric_limits<double>::max();

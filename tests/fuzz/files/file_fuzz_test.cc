@@ -10,16 +10,13 @@
 #include "tests/fuzz/files/file_check.h"
 #include "tests/fuzz/files/file_mutation.h"
 #include "tests/fuzz/files/file_seeds.h"
+#include "tests/test_size.h"
 
 namespace hulld::fuzz {
 namespace file_fuzz_test {
 
 // Runs the fuzz target without the fuzzer: a fixed number of inputs from a fixed seed.
-#ifdef HULLD_SANITIZED
-constexpr int kChangesPerSeed = 300;
-#else
-constexpr int kChangesPerSeed = 1500;
-#endif
+constexpr int kChangesPerSeed = TestSize(1500, 300);
 
 // HULLD_FUZZ_CHANGES sets another number, for long runs by hand.
 int ChangesPerSeed() {

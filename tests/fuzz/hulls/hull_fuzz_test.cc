@@ -8,16 +8,13 @@
 #include "tests/core/checks/point_sets.h"
 #include "tests/fuzz/hulls/fuzz_cloud.h"
 #include "tests/fuzz/hulls/hull_check.h"
+#include "tests/test_size.h"
 
 namespace hulld::fuzz {
 namespace hull_fuzz_test {
 
 // Runs the fuzz target without the fuzzer: a fixed number of inputs from a fixed seed.
-#ifdef HULLD_SANITIZED
-constexpr int kInputs = 150;
-#else
-constexpr int kInputs = 1500;
-#endif
+constexpr int kInputs = TestSize(1500, 150);
 
 std::vector<uint8_t> RandomBytes(Random& random) {
   std::vector<uint8_t> bytes(static_cast<size_t>(random.Between(0, 160)));

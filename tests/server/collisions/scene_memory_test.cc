@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "tests/server/harness/test_server.h"
+#include "tests/test_size.h"
 
 namespace hulld::server {
 namespace scene_memory_test {
@@ -45,6 +46,7 @@ class SceneMemory : public ServerTest {
 // their boxes, and the answers that gRPC has not taken: a few MiB, counted against --memory-limit.
 TEST_F(SceneMemory, AnUnreadSceneIsCountedAndBounded) {
   constexpr int kPlacements = 200'000;
+  constexpr int kRead = TestSize(1500, 500);
   // Placed hulls, their boxes twice, the tree.
   constexpr double kLeast = kPlacements * 300.0;
   constexpr double kMax = kPlacements * 700.0 + (16 << 20);
@@ -59,11 +61,11 @@ TEST_F(SceneMemory, AnUnreadSceneIsCountedAndBounded) {
   EXPECT_GT(Metric("hulld_cache_bytes") - before, kLeast);
   // A concurrent scene whose answers are read completes; both take turns.
   grpc::ClientContext read_context;
-  const auto read = collisions_->FindCollisions(&read_context, Heap(1500));
+  const auto read = collisions_->FindCollisions(&read_context, Heap(kRead));
   v1::FindCollisionsResponse part;
   while (read->Read(&part)) EXPECT_LT(Metric("hulld_cache_bytes") - before, kMax);
   ASSERT_TRUE(read->Finish().ok());
-  EXPECT_EQ(part.totals().overlapping(), 1500u * 1499 / 2);
+  EXPECT_EQ(part.totals().overlapping(), uint64_t{kRead} * (kRead - 1) / 2);
   // 2e10 pairs in total.
   EXPECT_LT(Metric("hulld_pairs_total"), 2e6);
   context.TryCancel();

@@ -9,6 +9,7 @@
 #include <thread>
 
 #include "tests/server/harness/test_server.h"
+#include "tests/test_size.h"
 
 namespace hulld::server {
 namespace textbook_memory_test {
@@ -129,7 +130,8 @@ TEST_F(TextbookMemory, ABatchBeginsOneLargePairAtATime) {
   request.set_method(v1::METHOD_TEXTBOOK_SAT);
   *request.add_placements() = PlacementOf("beside");
   *request.add_placements() = PlacementOf("large");
-  for (int pair = 0; pair < 4; ++pair) {
+  constexpr int kPairs = TestSize(4, 2);
+  for (int pair = 0; pair < kPairs; ++pair) {
     request.add_pairs(0);
     request.add_pairs(1);
   }
@@ -144,7 +146,7 @@ TEST_F(TextbookMemory, ABatchBeginsOneLargePairAtATime) {
   }
   const grpc::Status status = reader->Finish();
   EXPECT_TRUE(status.ok()) << status.error_message();
-  EXPECT_EQ(touching, 4);
+  EXPECT_EQ(touching, kPairs);
 }
 
 }  // namespace textbook_memory_test

@@ -28,6 +28,7 @@
 #include "core/query/collision.h"
 #include "tests/server/endurance/hull_model.h"
 #include "tests/server/harness/restartable_server.h"
+#include "tests/test_size.h"
 
 namespace hulld::server {
 namespace endurance_test {
@@ -40,11 +41,7 @@ constexpr int kSharedHulls = 3;
 constexpr int kCallsPerRound = 120;
 // The first rounds fill caches and pools.
 constexpr int kWarmRounds = 2;
-#ifdef HULLD_SANITIZED
-constexpr int kRounds = 6;
-#else
-constexpr int kRounds = 12;
-#endif
+constexpr int kRounds = TestSize(12, 6);
 
 int NumberIn(const char* name, int otherwise) {
   const char* const given = std::getenv(name);

@@ -14,6 +14,7 @@
 #include "server/registry/registry.h"
 #include "tests/server/harness/store_fixture.h"
 #include "tests/server/registry/registry_interleaving.h"
+#include "tests/test_size.h"
 
 namespace hulld::server {
 namespace registry_chaos_test {
@@ -114,11 +115,7 @@ class RegistryChaos : public RegistryInterleaving {
 };
 
 TEST_F(RegistryChaos, EveryVersionMatchesItsRecord) {
-#ifdef HULLD_SANITIZED
-  constexpr uint64_t kChunks = 300;
-#else
-  constexpr uint64_t kChunks = 1500;
-#endif
+  constexpr uint64_t kChunks = TestSize(1500, 300);
   constexpr int kHulls = 3;
   store_.refused_of_1000 = 100;
   std::atomic<int> writing = kHulls;

@@ -10,15 +10,12 @@
 #include <iostream>
 
 #include "tests/server/schedules/explorer.h"
+#include "tests/test_size.h"
 
 namespace hulld::server {
 namespace registry_schedules_test {
 
-#ifdef HULLD_SANITIZED
-constexpr uint64_t kSchedules = 10'000;
-#else
-constexpr uint64_t kSchedules = 50'000;
-#endif
+constexpr uint64_t kSchedules = TestSize(50'000, 10'000);
 
 // Long runs report their progress after each block.
 constexpr uint64_t kBlock = 200'000;

@@ -11,6 +11,7 @@
 #include "server/store/store_keys.h"
 #include "tests/server/harness/kept_store.h"
 #include "tests/server/harness/store_fixture.h"
+#include "tests/test_size.h"
 
 namespace hulld::server {
 namespace store_damage_test {
@@ -251,11 +252,7 @@ TEST_F(RocksDbDamage, FlippedBitsInItsFilesAreNeverServed) {
   ASSERT_TRUE(hulls_->Put("late", CubeCorners()).ok());
   hulls_ = nullptr;
 
-#ifdef HULLD_SANITIZED
-  constexpr int kTrials = 40;
-#else
-  constexpr int kTrials = 120;
-#endif
+  constexpr int kTrials = TestSize(120, 40);
   std::mt19937_64 random(20261121);
   int refused_to_open = 0;
   int reported = 0;

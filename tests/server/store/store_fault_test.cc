@@ -15,6 +15,7 @@
 #include "core/hull/audit.h"
 #include "tests/server/harness/faulty_file_system.h"
 #include "tests/server/harness/store_fixture.h"
+#include "tests/test_size.h"
 
 namespace hulld::server {
 namespace store_fault_test {
@@ -436,11 +437,7 @@ class Acks {
 // Power fails at random moments under four writers. Every acknowledged chunk survives, every hull
 // passes its audit, and no revision goes back.
 TEST_F(StoreFault, NoAckPrecedesItsSync) {
-#ifdef HULLD_SANITIZED
-  constexpr int kOutages = 12;
-#else
-  constexpr int kOutages = 50;
-#endif
+  constexpr int kOutages = TestSize(50, 12);
   constexpr int kWriters = 4;
   constexpr uint64_t kSeed = 811;
   RecordProperty("seed", std::to_string(kSeed));

@@ -9,17 +9,13 @@
 #include "core/hull/growth/hull_builder.h"
 #include "tests/core/checks/oracle_bridge.h"
 #include "tests/core/checks/point_sets.h"
+#include "tests/test_size.h"
 
 namespace hulld {
 namespace degenerate_hull_test {
 
-#ifdef HULLD_SANITIZED
-constexpr int kLatticeSide = 16;
-constexpr int kLargeRounds = 4;
-#else
-constexpr int kLatticeSide = 50;
-constexpr int kLargeRounds = 60;
-#endif
+constexpr int kLatticeSide = TestSize(50, 16);
+constexpr int kLargeRounds = TestSize(60, 4);
 
 // Expects a cube's 8 vertices, 12 edges, and 6 squares.
 void ExpectBox(const Hull& hull) {

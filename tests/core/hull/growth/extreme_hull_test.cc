@@ -15,19 +15,14 @@
 #include "tests/core/checks/point_sets.h"
 #include "tests/oracle/brute_force_hull.h"
 #include "tests/oracle/cgal_hull.h"
+#include "tests/test_size.h"
 
 namespace hulld {
 namespace extreme_hull_test {
 
-#ifdef HULLD_SANITIZED
-constexpr int kPoints = 300;
-constexpr int kDuplicates = 50000;
-constexpr int kSmallRounds = 2;
-#else
-constexpr int kPoints = 1500;
-constexpr int kDuplicates = 1000000;
-constexpr int kSmallRounds = 6;
-#endif
+constexpr int kPoints = TestSize(1500, 300);
+constexpr int kDuplicates = TestSize(1000000, 50000);
+constexpr int kSmallRounds = TestSize(6, 2);
 
 constexpr double kLargest = std::numeric_limits<double>::max();
 constexpr double kLeast = std::numeric_limits<double>::denorm_min();

@@ -24,11 +24,7 @@ namespace hull_builder_test {
 
 using testing::HasSubstr;
 
-#ifdef HULLD_SANITIZED
-constexpr int kRounds = 600;
-#else
-constexpr int kRounds = 3000;
-#endif
+constexpr int kRounds = TestSize(3000, 600);
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();

@@ -25,11 +25,7 @@ namespace hulld {
 namespace simplify_test {
 
 // The time of an exact audit grows with the square of this.
-#ifdef HULLD_SANITIZED
-constexpr int kLargeSphere = 1000;
-#else
-constexpr int kLargeSphere = 5000;
-#endif
+constexpr int kLargeSphere = TestSize(5000, 1000);
 
 Hull HullOf(const std::vector<Vector>& points) { return BuildHull(points); }
 

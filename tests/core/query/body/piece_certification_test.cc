@@ -14,6 +14,7 @@
 #include "tests/core/checks/certificate_bridge.h"
 #include "tests/core/query/body/own_body.h"
 #include "tests/core/query/body/rational_world.h"
+#include "tests/test_size.h"
 
 namespace hulld {
 namespace piece_certification_test {
@@ -99,7 +100,7 @@ TEST(PieceCertification, ProvesEveryRelation) {
   Random random(TestSeed(4));
   std::array<int, 3> relations = {};
   Proven proven;
-  for (int round = 0; round < 420; ++round) {
+  for (int round = 0; round < TestSize(420, 80); ++round) {
     OwnBody a, b;
     FillLarge(random, random.Between(1, 4), &a);
     FillLarge(random, random.Between(1, 4), &b);
@@ -118,9 +119,9 @@ TEST(PieceCertification, ProvesEveryRelation) {
     ++relations[static_cast<size_t>(answer->answer.relation)];
     ExpectProof(a, X_WA, b, X_WB, *answer, &proven);
   }
-  for (const int count : relations) EXPECT_GT(count, 3);
-  EXPECT_GT(proven.certificates, 100u);
-  EXPECT_GT(proven.settled, 200u);
+  for (const int count : relations) EXPECT_GT(count, TestSize(3, 0));
+  EXPECT_GT(proven.certificates, uint64_t{TestSize(100, 20)});
+  EXPECT_GT(proven.settled, uint64_t{TestSize(200, 40)});
 }
 
 // When floating point overflows, boxes cover all of space or are far too large: then pairs are

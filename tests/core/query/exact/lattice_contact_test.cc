@@ -11,15 +11,12 @@
 #include "tests/core/checks/oracle_bridge.h"
 #include "tests/core/checks/point_sets.h"
 #include "tests/core/checks/relation_check.h"
+#include "tests/test_size.h"
 
 namespace hulld {
 namespace lattice_contact_test {
 
-#ifdef HULLD_SANITIZED
-constexpr int kRounds = 10000;
-#else
-constexpr int kRounds = 20000;
-#endif
+constexpr int kRounds = TestSize(20000, 10000);
 
 std::optional<LatticeContact> Find(const Hull& a, const Pose& X_WA, const Hull& b,
                                    const Pose& X_WB) {

@@ -9,6 +9,7 @@
 #include "core/query/floating/path_cast.h"
 #include "core/query/motion/pair_at.h"
 #include "tests/core/query/motion/motion_check.h"
+#include "tests/test_size.h"
 
 namespace hulld {
 namespace path_cast_test {
@@ -77,7 +78,7 @@ TEST(PathCast, RandomPairsAgreeWithTheirProofs) {
   for (const int vertices : {4, 8, 14, 60}) {
     SCOPED_TRACE(vertices);
     Counts counts;
-    for (int round = 0; round < 60; ++round) {
+    for (int round = 0; round < TestSize(60, 20); ++round) {
       SCOPED_TRACE(round);
       const Pose X_WA = RandomPose(random, 0.5);
       const OwnMoving a(RandomOnSphere(random, vertices, 1), {X_WA, X_WA});
@@ -85,8 +86,8 @@ TEST(PathCast, RandomPairsAgreeWithTheirProofs) {
       Check(a, b, counts);
       if (HasFatalFailure()) return;
     }
-    EXPECT_GT(counts.separated, 5);
-    EXPECT_GT(counts.meeting, 15);
+    EXPECT_GT(counts.separated, TestSize(5, 1));
+    EXPECT_GT(counts.meeting, TestSize(15, 4));
     // Few pairs need the exact steps.
     EXPECT_GE(counts.by_cast + 1, counts.separated);
     EXPECT_GE(counts.by_entry + 2, counts.meeting);

@@ -3,12 +3,14 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "core/query/motion/first_contact.h"
 #include "tests/core/checks/point_sets.h"
 #include "tests/core/query/motion/motion_check.h"
+#include "tests/test_size.h"
 
 namespace hulld {
 namespace graze_test {
@@ -123,13 +125,9 @@ MotionOptions FinestResolution() {
   return options;
 }
 
-#ifdef HULLD_SANITIZED
-constexpr double kScales[] = {1};
-constexpr int kDigitStep = 4;
-#else
-constexpr double kScales[] = {1, 3e-18};
-constexpr int kDigitStep = 2;
-#endif
+constexpr double kAllScales[] = {1, 3e-18};
+constexpr auto kScales = std::span(kAllScales).first(TestSize(2, 1));
+constexpr int kDigitStep = TestSize(2, 8);
 // Exact arithmetic polls several times per step. Observed: 282.
 constexpr int kMaxPolls = 400;
 
@@ -176,8 +174,8 @@ TEST(Graze, ShallowContactsAreFound) {
 // The separation is smallest at time 1/2, and positive there if and only if the gap is positive.
 TEST(Graze, AnswersAgreeWithDenseSamples) {
   std::vector<Rational> times = {Rational(1, 2)};
-  for (int i = 0; i <= 16; ++i) times.push_back(Rational(i, 16));
-  for (int exponent = 4; exponent <= 44; exponent += 8) {
+  for (int i = 0; i <= 16; i += TestSize(1, 4)) times.push_back(Rational(i, 16));
+  for (int exponent = 4; exponent <= 44; exponent += TestSize(8, 20)) {
     const Rational step(std::ldexp(1, -exponent));
     times.push_back(Rational(1, 2) - step);
     times.push_back(Rational(1, 2) + step);

@@ -10,6 +10,7 @@
 #include "tests/core/checks/point_sets.h"
 #include "tests/core/query/body/own_body.h"
 #include "tests/core/query/motion/motion_check.h"
+#include "tests/test_size.h"
 
 namespace hulld {
 namespace moving_body_test {
@@ -89,7 +90,7 @@ TEST(MovingBody, MeetsWhenItsEarliestPieceMeets) {
   Random random(TestSeed(1));
   std::array<int, 4> relations = {};
   int ended_early = 0;
-  for (int round = 0; round < 60; ++round) {
+  for (int round = 0; round < TestSize(60, 16); ++round) {
     SCOPED_TRACE(round);
     const bool turns = round % 2 == 1;
     OwnMovingBody a(RandomMotion(random, 2, turns && round % 4 == 1), round % 8 == 7 ? 0.125 : 0);
@@ -153,9 +154,9 @@ TEST(MovingBody, MeetsWhenItsEarliestPieceMeets) {
     EXPECT_EQ(swapped->contact.separated_until, until);
     EXPECT_EQ(swapped->contact.contact_time, contact_time);
   }
-  EXPECT_GT(relations[static_cast<size_t>(Relation::kSeparated)], 5);
-  EXPECT_GT(relations[static_cast<size_t>(Relation::kOverlapping)], 5);
-  EXPECT_GT(ended_early, 5);
+  EXPECT_GT(relations[static_cast<size_t>(Relation::kSeparated)], TestSize(5, 0));
+  EXPECT_GT(relations[static_cast<size_t>(Relation::kOverlapping)], TestSize(5, 0));
+  EXPECT_GT(ended_early, TestSize(5, 0));
 }
 
 // The point meets a triangle and a cube at time 1/2, and overlaps only the cube.
@@ -211,7 +212,7 @@ TEST(MovingBody, EmptyBodiesAndPiecesNeverMeet) {
 TEST(MovingBody, TranslationsOfPosedPiecesAreExact) {
   Random random(TestSeed(2));
   std::array<int, 3> relations = {};
-  for (int round = 0; round < 50; ++round) {
+  for (int round = 0; round < TestSize(50, 15); ++round) {
     SCOPED_TRACE(round);
     OwnMovingBody a(Translation({0, 0, 0}, LatticeVector(random, 2)));
     const Vector from = LatticeVector(random, 7);
@@ -247,8 +248,8 @@ TEST(MovingBody, TranslationsOfPosedPiecesAreExact) {
     EXPECT_EQ(FaultOf(a, b, *found), "");
     ++relations[static_cast<size_t>(strongest)];
   }
-  EXPECT_GT(relations[static_cast<size_t>(Relation::kSeparated)], 4);
-  EXPECT_GT(relations[static_cast<size_t>(Relation::kOverlapping)], 4);
+  EXPECT_GT(relations[static_cast<size_t>(Relation::kSeparated)], TestSize(4, 0));
+  EXPECT_GT(relations[static_cast<size_t>(Relation::kOverlapping)], TestSize(4, 0));
 }
 
 TEST(MovingBody, TooManyCertificatesAreRefused) {

@@ -10,6 +10,7 @@
 
 #include "core/query/scene/scene.h"
 #include "tests/core/query/motion/motion_check.h"
+#include "tests/test_size.h"
 
 namespace hulld {
 namespace swept_box_test {
@@ -68,7 +69,7 @@ TEST(SweptBox, NoPairThatMeetsIsDropped) {
   for (const double scale : {0x1p-1070, 1e-300, 1e-100, 1 / 3.0, 1.0, 1e100, 1e300, 0x1p1019}) {
     SCOPED_TRACE(scale);
     Counts counts;
-    for (int round = 0; round < 3000; ++round) {
+    for (int round = 0; round < TestSize(3000, 300); ++round) {
       const Vector low = scale * LatticeVector(random, 3);
       const Vector size = scale * LatticeVector(random, 2).cwiseAbs();
       const MovingBox box = {{low, low + size}, {low, low + size}};
@@ -91,9 +92,9 @@ TEST(SweptBox, NoPairThatMeetsIsDropped) {
       Check(PointInMotion(from, to + shift),
             {box.start, {box.end.low + shift, box.end.high + shift}}, counts);
     }
-    EXPECT_GT(counts.apart, 100);
-    EXPECT_GT(counts.touching, 50);
-    EXPECT_GT(counts.later, 100);
+    EXPECT_GT(counts.apart, TestSize(100, 10));
+    EXPECT_GT(counts.touching, TestSize(50, 5));
+    EXPECT_GT(counts.later, TestSize(100, 10));
     EXPECT_LT(counts.needless, counts.apart / 2);
   }
 }

@@ -8,6 +8,7 @@
 #include "core/query/motion/pair_at.h"
 #include "tests/core/checks/point_sets.h"
 #include "tests/core/query/motion/motion_check.h"
+#include "tests/test_size.h"
 
 namespace hulld {
 namespace turning_test {
@@ -73,7 +74,7 @@ Motion Between(const Pose& start, Pose end) {
 TEST(Turning, RandomMotionsAgreeWithSamples) {
   Random random(TestSeed(1));
   std::array<int, 4> relations = {};
-  for (int round = 0; round < 60; ++round) {
+  for (int round = 0; round < TestSize(60, 15); ++round) {
     SCOPED_TRACE(round);
     // Solid, so that contacts last longer than an instant.
     const OwnMoving a(RandomInBall(random, random.Between(4, 6), 1),
@@ -85,14 +86,14 @@ TEST(Turning, RandomMotionsAgreeWithSamples) {
     ASSERT_TRUE(AgreesWithSamples(a, b, contact, 16));
     ++relations[static_cast<size_t>(contact.relation)];
   }
-  EXPECT_GT(relations[static_cast<size_t>(Relation::kSeparated)], 10);
-  EXPECT_GT(relations[static_cast<size_t>(Relation::kOverlapping)], 5);
+  EXPECT_GT(relations[static_cast<size_t>(Relation::kSeparated)], TestSize(10, 0));
+  EXPECT_GT(relations[static_cast<size_t>(Relation::kOverlapping)], TestSize(5, 0));
 }
 
 TEST(Turning, PiecesWithAPoseAgreeWithSamples) {
   Random random(TestSeed(3));
   std::array<int, 4> relations = {};
-  for (int round = 0; round < 72; ++round) {
+  for (int round = 0; round < TestSize(72, 18); ++round) {
     SCOPED_TRACE(round);
     const Pose X_AP = round % 4 == 0 ? Pose{{3, 0, 0, 0}, Vector(1, 0, 0)} : RandomPose(random, 1);
     const OwnMoving a(RandomInBall(random, random.Between(4, 6), 1),
@@ -106,8 +107,8 @@ TEST(Turning, PiecesWithAPoseAgreeWithSamples) {
     ASSERT_TRUE(AgreesWithSamples(a, b, contact, 16));
     ++relations[static_cast<size_t>(contact.relation)];
   }
-  EXPECT_GT(relations[static_cast<size_t>(Relation::kSeparated)], 4);
-  EXPECT_GT(relations[static_cast<size_t>(Relation::kOverlapping)], 3);
+  EXPECT_GT(relations[static_cast<size_t>(Relation::kSeparated)], TestSize(4, 0));
+  EXPECT_GT(relations[static_cast<size_t>(Relation::kOverlapping)], TestSize(3, 0));
 }
 
 // A cube on an arm of length 5, which turns about the origin by 90 degrees, meets a wall at y = 4

@@ -11,6 +11,7 @@
 #include "core/query/motion/pair_at.h"
 #include "tests/core/checks/point_sets.h"
 #include "tests/core/query/motion/motion_check.h"
+#include "tests/test_size.h"
 
 // Rotations whose q(t) misses zero by a unit in the last place or more. The rotation then makes a
 // full turn within about that share of the motion.
@@ -166,11 +167,7 @@ void CheckContact(const OwnMoving& a, const OwnMoving& b, const Motion& X_WA,
   ++(*contact->contact_time < least ? counts.met_before : counts.met_there_or_after);
 }
 
-#ifdef HULLD_SANITIZED
-constexpr int kRounds = 16;
-#else
-constexpr int kRounds = 70;
-#endif
+constexpr int kRounds = TestSize(70, 6);
 
 TEST(Vanishing, MotionsAreAnsweredOrRefusedAsTheContractSays) {
   Random random(TestSeed(1));

@@ -13,6 +13,7 @@
 #include "core/query/collision.h"
 #include "tests/core/checks/oracle_bridge.h"
 #include "tests/core/checks/point_sets.h"
+#include "tests/test_size.h"
 
 namespace hulld {
 namespace center_bounds_test {
@@ -206,7 +207,7 @@ TEST(CenterBounds, RelationsAgreeWithTheSearch) {
   Random random(seed);
   const std::vector<NamedHull> solids = Solids(random);
   int settled[2] = {0, 0};
-  for (int round = 0; round < 5000; ++round) {
+  for (int round = 0; round < TestSize(5000, 800); ++round) {
     const NamedHull& one = solids[random.Below(static_cast<int>(solids.size()))];
     const NamedHull& other = solids[random.Below(static_cast<int>(solids.size()))];
     if (one.hull.max_abs_coordinate() > 0x1p60 * other.hull.max_abs_coordinate()) continue;
@@ -230,8 +231,8 @@ TEST(CenterBounds, RelationsAgreeWithTheSearch) {
         << one.name << ", " << other.name << " seed " << seed << " round " << round;
     if (plain.rung == Rung::kBounds) ++settled[plain.relation == Relation::kOverlapping];
   }
-  EXPECT_GT(settled[0], 300);
-  EXPECT_GT(settled[1], 300);
+  EXPECT_GT(settled[0], TestSize(300, 40));
+  EXPECT_GT(settled[1], TestSize(300, 40));
 }
 
 // Coincident centers, and hulls that touch along the line of their centers.

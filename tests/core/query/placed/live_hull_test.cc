@@ -15,15 +15,12 @@
 #include "tests/core/checks/extreme_clouds.h"
 #include "tests/core/checks/oracle_bridge.h"
 #include "tests/core/checks/point_sets.h"
+#include "tests/test_size.h"
 
 namespace hulld {
 namespace live_hull_test {
 
-#ifdef HULLD_SANITIZED
-constexpr int kPoints = 60;
-#else
-constexpr int kPoints = 250;
-#endif
+constexpr int kPoints = TestSize(250, 60);
 
 // A hull that grows together with its builder.
 struct Growing {

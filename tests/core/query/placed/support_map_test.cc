@@ -245,13 +245,15 @@ TEST(SupportMap, ExtremeCoordinatesAreScanned) {
 // A map of V points takes O(V) memory for every set: sixteen times as many points take at most
 // about sixteen times as much.
 TEST(SupportMap, MemoryIsLinearForPointsAlongCurves) {
-  const std::vector<NamedSet> small = CurvedSets(4000);
-  const std::vector<NamedSet> large = CurvedSets(64000);
+  constexpr int kFew = TestSize(4000, 2000);
+  constexpr int kMany = 16 * kFew;
+  const std::vector<NamedSet> small = CurvedSets(kFew);
+  const std::vector<NamedSet> large = CurvedSets(kMany);
   for (size_t i = 0; i < small.size(); ++i) {
     const double few = static_cast<double>(SupportMap(small[i].points).MemoryBytes());
     const double many = static_cast<double>(SupportMap(large[i].points).MemoryBytes());
     EXPECT_LT(many, 24 * few) << large[i].name;
-    EXPECT_LT(many, 600.0 * 64000) << large[i].name;
+    EXPECT_LT(many, 600.0 * kMany) << large[i].name;
   }
 }
 
