@@ -47,29 +47,19 @@ class HulldError(Exception):
             self.code = code
         self.message = message
         self.reason = reason
-        self.metadata: Mapping[str, str] = MappingProxyType(dict(metadata or {}))
+        self._metadata = dict(metadata or {})
         self.request_id = request_id
         self.retry_after = retry_after
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        state = {
-            "code": self.code,
-            "reason": self.reason,
-            "metadata": dict(self.metadata),
-            "request_id": self.request_id,
-            "retry_after": self.retry_after,
-        }
-        return _restore, (type(self), self.message, state)
+    @property
+    def metadata(self) -> Mapping[str, str]:
+        return MappingProxyType(self._metadata)
 
     def __str__(self) -> str:
         details = [self.reason] if self.reason else []
         if self.request_id:
             details.append(f"request {self.request_id}")
         return f"{self.code}: {self.message}" + (f" ({', '.join(details)})" if details else "")
-
-
-def _restore(kind: type[HulldError], message: str, state: dict[str, Any]) -> HulldError:
-    return kind(message, **state)
 
 
 class CancelledError(HulldError):

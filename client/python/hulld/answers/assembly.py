@@ -33,14 +33,7 @@ class BatchAssembly:
             raise ValueError(
                 f"the batch ended with {frame.columns.rows} answers for {len(self._pairs)} pairs"
             )
-        return Batch(
-            self._pairs,
-            frame.columns.finish(),
-            frame.known_hulls(),
-            frame.placement_problems,
-            frame.header,
-            frame.known_piece_hulls(),
-        )
+        return Batch(self._pairs, *frame.finish())
 
 
 class SceneAssembly:
@@ -58,15 +51,7 @@ class SceneAssembly:
         pairs = frame.indices()
         if frame.header is None or frame.totals is None or pairs.size != 2 * frame.columns.rows:
             raise ValueError("the scene ended early, or its pairs and answers disagree")
-        return Scene(
-            pairs.reshape(-1, 2),
-            frame.columns.finish(),
-            frame.known_hulls(),
-            frame.placement_problems,
-            frame.totals,
-            frame.header,
-            frame.known_piece_hulls(),
-        )
+        return Scene(pairs.reshape(-1, 2), *frame.finish(), frame.totals)
 
 
 class StepAssembly:
@@ -96,13 +81,4 @@ class StepAssembly:
             or (rows.size and int(rows.max()) >= len(self._pairs))
         ):
             raise ValueError("the answer's pairs and columns disagree")
-        return StreamAnswer(
-            self._update,
-            rows,
-            self._pairs[rows],
-            frame.columns.finish(),
-            frame.known_hulls(),
-            frame.placement_problems,
-            frame.header,
-            frame.known_piece_hulls(),
-        )
+        return StreamAnswer(self._pairs[rows], *frame.finish(), self._update, rows)

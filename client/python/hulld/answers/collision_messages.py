@@ -46,6 +46,8 @@ from hulld.v1 import collision_pb2, error_pb2, geometry_pb2
 from hulld.wire import Unsigned, named_arrays, named_fields, packed_varints
 
 T = TypeVar("T")
+# By ID.
+_Hulls = Mapping[str, HullVersion]
 
 
 def _vector(message: Any) -> npt.NDArray[np.float64]:
@@ -194,6 +196,7 @@ _MESSAGES: dict[str, tuple[Any, Callable[[Any], Any]]] = {
     "certificates": (collision_pb2.Certificate, _certificate_of),
 }
 
+
 class ColumnReader:
     """Collects the columns of messages into answers."""
 
@@ -340,11 +343,17 @@ class Frame:
         empty = np.empty(0, np.uint32)
         return np.concatenate([empty, *(part.astype(np.uint32) for part in self.pairs)])
 
-    def known_hulls(self) -> Mapping[str, HullVersion]:
-        return {version.hull_id: version for version in self.hulls if version is not None}
-
-    def known_piece_hulls(self) -> Mapping[str, HullVersion]:
-        return {version.hull_id: version for version in self.piece_hulls}
+    def finish(self) -> tuple[Answers, _Hulls, Mapping[int, Problem], Header, _Hulls]:
+        """The fields of a Batch after its pairs. ValueError: something is missing."""
+        if self.header is None:
+            raise ValueError("the answer has no header")
+        return (
+            self.columns.finish(),
+            {version.hull_id: version for version in self.hulls if version is not None},
+            self.placement_problems,
+            self.header,
+            {version.hull_id: version for version in self.piece_hulls},
+        )
 
 
 def decode_collision_changes(data: bytes) -> CollisionChanges:

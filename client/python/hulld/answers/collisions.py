@@ -509,12 +509,16 @@ def _counted(answers: Answers) -> str:
     return f"{len(answers)} pairs" + (f": {', '.join(names)}" if names else "")
 
 
+@dataclass(frozen=True, repr=False)
 class _Rows:
     """Pairs with their answers, row by row."""
 
     pairs: npt.NDArray[np.uint32]
     answers: Answers
+    hulls: Mapping[str, HullVersion]
     placement_problems: Mapping[int, Problem]
+    header: Header
+    piece_hulls: Mapping[str, HullVersion]
 
     def __len__(self) -> int:
         return len(self.pairs)
@@ -561,13 +565,6 @@ class Batch(_Rows):
     requested, the hulls of the pieces of all bodies, by ID.
     """
 
-    pairs: npt.NDArray[np.uint32]
-    answers: Answers
-    hulls: Mapping[str, HullVersion]
-    placement_problems: Mapping[int, Problem]
-    header: Header
-    piece_hulls: Mapping[str, HullVersion] = field(default_factory=dict)
-
 
 @dataclass(frozen=True)
 class SceneTotals:
@@ -588,13 +585,7 @@ class Scene(_Rows):
     """All pairs of a scene that collide, or are within the clearance or tolerance: k x 2 pairs, the
     lower index first, ascending. Other fields are as in Batch."""
 
-    pairs: npt.NDArray[np.uint32]
-    answers: Answers
-    hulls: Mapping[str, HullVersion]
-    placement_problems: Mapping[int, Problem]
     totals: SceneTotals
-    header: Header
-    piece_hulls: Mapping[str, HullVersion] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, repr=False)
@@ -609,12 +600,6 @@ class StreamAnswer(_Rows):
 
     update: int
     rows: npt.NDArray[np.uint32]
-    pairs: npt.NDArray[np.uint32]
-    answers: Answers
-    hulls: Mapping[str, HullVersion]
-    placement_problems: Mapping[int, Problem]
-    header: Header
-    piece_hulls: Mapping[str, HullVersion] = field(default_factory=dict)
 
 
 class CollisionEventKind(IntEnum):

@@ -63,7 +63,7 @@ def _product(f: Sequence[Fraction], g: Sequence[Fraction]) -> tuple[Fraction, ..
 
 
 class MovingPiece:
-    """A hull in motion, or a piece of a body in motion."""
+    """A hull, or a piece of a body, in motion or at rest."""
 
     def __init__(
         self,
@@ -78,8 +78,9 @@ class MovingPiece:
         if piece is not None:
             self.radius += Fraction(piece.radius)
             self._inner = [ExactPose.of(Pose() if piece.pose is None else piece.pose)]
-        end = placement.pose if placement.end_pose is None else placement.end_pose
-        self._ends = (pose_parts(placement.pose), pose_parts(end))
+        start = pose_parts(placement.pose)
+        end = start if placement.end_pose is None else pose_parts(placement.end_pose)
+        self._ends = (start, end)
 
     def is_empty(self) -> bool:
         return len(self._vertices) == 0
@@ -93,7 +94,7 @@ class MovingPiece:
 
     def at(self, time: float) -> Piece:
         poses = [*self._inner, ExactPose(*self._parts_at(Fraction(time)))]
-        return Piece(self._vertices, poses, [self.radius], self._in_any_order)
+        return Piece(self._vertices, poses, self.radius, self._in_any_order)
 
     def keeps_rotation(self) -> bool:
         """True if one quaternion is a positive multiple of the other."""

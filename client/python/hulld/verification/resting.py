@@ -27,17 +27,16 @@ STRENGTH = {Relation.SEPARATED: 0, Relation.TOUCHING: 1, Relation.OVERLAPPING: 2
 
 
 class Piece:
-    """A rounded hull at its pose. Its vertices are transformed on first use. radii: the radius is
-    their sum."""
+    """A rounded hull at its pose. Its vertices are transformed on first use."""
 
     def __init__(
         self,
         vertices: npt.NDArray[np.float64],
         poses: Sequence[ExactPose],
-        radii: Sequence[float | Fraction],
+        radius: Fraction,
         in_any_order: bool = False,
     ) -> None:
-        self.radius = sum((Fraction(radius) for radius in radii), Fraction(0))
+        self.radius = radius
         self._vertices = vertices
         self._poses = poses
         self._in_any_order = in_any_order

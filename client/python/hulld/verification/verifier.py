@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Protocol, Union
 
 import numpy as np
@@ -29,11 +29,10 @@ from hulld.geometry.placements import (
     PlacementsLike,
     as_moving,
 )
-from hulld.geometry.poses import ORTHOGONALITY_TOLERANCE, Pose, PoseLike
+from hulld.geometry.poses import ORTHOGONALITY_TOLERANCE, PoseLike
 from hulld.verification.error import VerificationError
 from hulld.verification.moving import MovingPiece, check_first_contact, check_moving_bodies
-from hulld.verification.rational import ExactPose
-from hulld.verification.resting import STRENGTH, Piece, check_bodies, check_deciding, check_pair
+from hulld.verification.resting import STRENGTH, check_bodies, check_deciding, check_pair
 
 Rows = Union[Batch, Scene, StreamAnswer]
 #: Of Wanted.max_time_error in the contract.
@@ -151,70 +150,40 @@ class Verifier:
             raise VerificationError(f"{relation.name} has no certificate")
         if (a.id or "", b.id or "") != (versions[0].hull_id, versions[1].hull_id):
             raise VerificationError("the answer is about different hulls")
-        if a.end_pose is not None or b.end_pose is not None:
-            if proof is not None:
-                of_a = self._moving_pieces(a, versions[0], piece_hulls)
-                of_b = self._moving_pieces(b, versions[1], piece_hulls)
-                check_moving_bodies(relation, contact, proof, of_a, of_b, max_time_error)
-                shown = [one for one in proof if one.relation != Relation.SEPARATED]
-                check_deciding(relation, shown, deciding)
-                return
-            moving = (self._moving(a, versions[0]), self._moving(b, versions[1]))
-            check_first_contact(relation, contact, certificate, *moving, max_time_error)
-            return
+        moves = a.end_pose is not None or b.end_pose is not None
         if proof is None:
-            if certificate is None:
+            if certificate is None and not moves:
                 raise VerificationError("the answer has no certificate")
-            hulls = self._hull(a, versions[0]), self._hull(b, versions[1])
-            check_pair(relation, certificate, *hulls)
+            pair = self._hull(a, versions[0]), self._hull(b, versions[1])
+            if moves or certificate is None:
+                check_first_contact(relation, contact, certificate, *pair, max_time_error)
+            else:
+                check_pair(relation, certificate, pair[0].at(0), pair[1].at(0))
             return
-        check_bodies(
-            relation,
-            proof,
-            self._pieces(a, versions[0], piece_hulls),
-            self._pieces(b, versions[1], piece_hulls),
-        )
-        check_deciding(relation, [one for one in proof if one.relation == relation], deciding)
+        of_a = self._pieces(a, versions[0], piece_hulls)
+        of_b = self._pieces(b, versions[1], piece_hulls)
+        if moves:
+            check_moving_bodies(relation, contact, proof, of_a, of_b, max_time_error)
+            shown = [one for one in proof if one.relation != Relation.SEPARATED]
+        else:
+            resting = [[piece.at(0) for piece in pieces] for pieces in (of_a, of_b)]
+            check_bodies(relation, proof, *resting)
+            shown = [one for one in proof if one.relation == relation]
+        check_deciding(relation, shown, deciding)
 
-    def _points(self, placement: Placement, version: HullVersion) -> npt.NDArray[np.float64]:
-        if placement.shape is None:
-            return self._vertices(version)
-        return placement.shape.astype(np.float64)
-
-    def _hull(self, placement: Placement, version: HullVersion) -> Piece:
-        poses = [ExactPose.of(placement.pose)]
-        in_any_order = placement.shape is not None
-        return Piece(self._points(placement, version), poses, [placement.radius], in_any_order)
-
-    def _moving(self, placement: Placement, version: HullVersion) -> MovingPiece:
-        return MovingPiece(placement, self._points(placement, version))
+    def _hull(self, placement: Placement, version: HullVersion) -> MovingPiece:
+        shape = placement.shape
+        vertices = self._vertices(version) if shape is None else shape.astype(np.float64)
+        return MovingPiece(placement, vertices)
 
     def _pieces(
         self, placement: Placement, version: HullVersion, piece_hulls: Mapping[str, HullVersion]
-    ) -> list[Piece]:
+    ) -> list[MovingPiece]:
+        """The pieces of a body, or the hull itself."""
         body = self._body(version) if placement.shape is None else None
         if body is None:
             return [self._hull(placement, version)]
         pieces = []
-        outer = ExactPose.of(placement.pose)
-        for piece, vertices in self._parts(placement, body, piece_hulls):
-            inner = ExactPose.of(Pose() if piece.pose is None else piece.pose)
-            pieces.append(Piece(vertices, [inner, outer], [placement.radius, piece.radius]))
-        return pieces
-
-    def _moving_pieces(
-        self, placement: Placement, version: HullVersion, piece_hulls: Mapping[str, HullVersion]
-    ) -> list[MovingPiece]:
-        body = self._body(version) if placement.shape is None else None
-        if body is None:
-            return [self._moving(placement, version)]
-        parts = self._parts(placement, body, piece_hulls)
-        return [MovingPiece(placement, vertices, piece) for piece, vertices in parts]
-
-    def _parts(
-        self, placement: Placement, body: Body, piece_hulls: Mapping[str, HullVersion]
-    ) -> Iterator[tuple[Placement, npt.NDArray[np.float64]]]:
-        """The pieces of a body and their vertices."""
         for index in range(len(body.pieces)):
             piece = body.pieces[index]
             if piece.id is None or piece.id not in piece_hulls:
@@ -222,7 +191,8 @@ class Verifier:
                     f"piece {index} of body {placement.id} is hull {piece.id}, whose revision "
                     "the answer does not state"
                 )
-            yield piece, self._vertices(piece_hulls[piece.id])
+            pieces.append(MovingPiece(placement, self._vertices(piece_hulls[piece.id]), piece))
+        return pieces
 
     def _vertices(self, version: HullVersion) -> npt.NDArray[np.float64]:
         known = self._meshes.get(version.hull_id)
