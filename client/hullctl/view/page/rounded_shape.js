@@ -1,8 +1,8 @@
 // The surface of an object with a radius: its hulls plus a ball, approximated from inside.
-import {directions, extremeVertex, fewVertices, hullTriangles} from 'hulld/drawing/convex_hull.js';
+import {directions, extremeVertex, fewVertices, hullTriangles, normalOf} from 'hulld/drawing/convex_hull.js';
 import {toWorld} from 'hulld/pose.js';
 import {Shape} from 'hulld/shape.js';
-import {cross, difference} from 'hulld/vector.js';
+import {difference} from 'hulld/vector.js';
 
 // Directions in which the surface of a hull is sampled, and those of all hulls of a scene.
 const MAX_DIRECTIONS = 400;
@@ -12,12 +12,6 @@ const MIN_DIRECTIONS = 40;
 const MAX_TRIANGLES = 100;
 // Larger hulls are represented by their extreme vertices.
 const MAX_VERTICES = 300;
-
-function normalOf([a, b, c]) {
-  const n = cross(difference(b, a), difference(c, a));
-  const length = Math.hypot(...n) || 1;
-  return n.map((value) => value / length);
-}
 
 // Returns points on the surface of a hull plus a ball: those in `count` directions, and the corners
 // of its moved facets.

@@ -1,6 +1,6 @@
 // The convex hull of a few hundred points in floating point, for pictures only: answers use the
 // hulls computed by hulld.
-import {cross, difference, dot} from 'hulld/vector.js';
+import {cross, difference, dot, unit} from 'hulld/vector.js';
 
 // Points closer to a facet than this fraction of the extent do not count as outside.
 const RELATIVE_TOLERANCE = 1e-9;
@@ -47,6 +47,9 @@ export function fewVertices({xyz}, maxCount) {
   return [...new Set(directions(maxCount).map((d) => extremeVertex(xyz, d)))].map(at);
 }
 
+// Returns the unit normal of a triangle.
+export const normalOf = ([a, b, c]) => unit(cross(difference(b, a), difference(c, a)));
+
 // Returns the corners of the triangles of the hull of `points` ([x, y, z] each) as indices,
 // counterclockwise from outside; empty if the points lie in a plane.
 // Cost: O(points * facets). Source: the beneath-beyond method, Gruenbaum 1961.
@@ -62,18 +65,16 @@ export function hullTriangles(points) {
   if (Math.abs(height(d)) <= tolerance) return [];
 
   const facetOf = (corners) => {
-    const [p, q, r] = corners.map((i) => points[i]);
-    const n = cross(difference(q, p), difference(r, p));
-    const length = Math.hypot(...n) || 1;
-    const unit = n.map((value) => value / length);
-    return {corners, unit, offset: dot(unit, p) + tolerance};
+    const triangle = corners.map((i) => points[i]);
+    const n = normalOf(triangle);
+    return {corners, n, offset: dot(n, triangle[0]) + tolerance};
   };
   const [i, j, k, l] = [a, b, c, d].map((point) => points.indexOf(point));
   const base = height(d) < 0 ? [i, j, k] : [i, k, j];
   const sides = base.map((from, at) => [base[(at + 1) % 3], from, l]);
   let facets = [base, ...sides].map(facetOf);
   points.forEach((point, index) => {
-    const isSeen = ({unit, offset}) => dot(unit, point) > offset;
+    const isSeen = ({n, offset}) => dot(n, point) > offset;
     const seen = facets.filter(isSeen);
     if (!seen.length) return;
     const edges = new Map();

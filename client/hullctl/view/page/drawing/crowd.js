@@ -2,7 +2,7 @@
 // to float: two draw calls instead of two per object.
 import {DrawnGroup, facetMaterial} from 'hulld/drawing/drawn_group.js';
 import {FINE_LAYER} from 'hulld/drawing/stage.js';
-import {THREE} from 'hulld/drawing/three.js';
+import {geometryFrom, THREE} from 'hulld/drawing/three.js';
 import {RELATIONS} from 'hulld/palette.js';
 import {rotate, unitQuaternion} from 'hulld/pose.js';
 
@@ -47,13 +47,7 @@ export class Crowd extends DrawnGroup {
   }
 
   add(triangles, edges) {
-    const geometryWith = (color, index) => {
-      const geometry = new THREE.BufferGeometry();
-      geometry.setAttribute('position', this.positions);
-      geometry.setAttribute('color', color);
-      if (index) geometry.setIndex(new THREE.BufferAttribute(index, 1));
-      return geometry;
-    };
+    const geometryWith = (color, index) => geometryFrom({position: this.positions, color}, index);
     const colored = {vertexColors: THREE.VertexColors};
     const parts = [];
     if (this.model.show.hull)

@@ -1,7 +1,7 @@
 // The ground: a grid below the scene, perpendicular to the axis that points up, with lines at
 // round coordinates; and a bar in a corner that shows the scale.
 import {DrawnGroup} from 'hulld/drawing/drawn_group.js';
-import {THREE} from 'hulld/drawing/three.js';
+import {geometryFrom, THREE} from 'hulld/drawing/three.js';
 import {element, short} from 'hulld/panels/dom.js';
 
 // Extent of the grid, in radii of the scene, and pieces of a line, for fading toward its ends.
@@ -60,9 +60,8 @@ export class Ground extends DrawnGroup {
         }
       }
     }
-    const geometry = new THREE.BufferGeometry();
-    geometry.setAttribute('position', new THREE.Float32BufferAttribute(positions, 3));
-    geometry.setAttribute('color', new THREE.Float32BufferAttribute(colors, 3));
+    const geometry =
+        geometryFrom({position: new Float32Array(positions), color: new Float32Array(colors)});
     const lines = new THREE.LineSegments(
         geometry, new THREE.LineBasicMaterial({vertexColors: THREE.VertexColors}));
     lines.renderOrder = -1;

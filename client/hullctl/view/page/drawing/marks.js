@@ -1,7 +1,7 @@
 // Draws an answer: the separating plane and its axis, the witness points, and the vertex pairs of
 // the certificate.
 import {DrawnGroup} from 'hulld/drawing/drawn_group.js';
-import {discTexture, gridTexture, THREE} from 'hulld/drawing/three.js';
+import {discMaterial, gridTexture, THREE} from 'hulld/drawing/three.js';
 import {MARK_COLORS} from 'hulld/palette.js';
 
 // With more edges, lines would hide the surface.
@@ -60,8 +60,8 @@ export class Marks extends DrawnGroup {
 
   line(points, color, options = {}) {
     const geometry = new THREE.BufferGeometry().setFromPoints(points);
-    const material = new THREE.LineBasicMaterial(
-        {color: color, depthTest: false, transparent: true, ...options});
+    const material =
+        new THREE.LineBasicMaterial({color, depthTest: false, transparent: true, ...options});
     const line = new THREE.LineSegments(geometry, material);
     line.renderOrder = 8;
     this.group.add(line);
@@ -69,16 +69,8 @@ export class Marks extends DrawnGroup {
 
   dots(points, color, size) {
     const geometry = new THREE.BufferGeometry().setFromPoints(points);
-    const material = new THREE.PointsMaterial({
-      color: color,
-      size,
-      sizeAttenuation: false,
-      depthTest: false,
-      transparent: true,
-      map: discTexture(),
-      alphaTest: 0.3,
-    });
-    const dots = new THREE.Points(geometry, material);
+    const dots = new THREE.Points(
+        geometry, discMaterial({color, size, depthTest: false, transparent: true}));
     dots.renderOrder = 9;
     this.group.add(dots);
   }

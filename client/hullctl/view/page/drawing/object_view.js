@@ -2,7 +2,7 @@
 // of the object's box, turned by the pose.
 import {DrawnGroup, facetMaterial} from 'hulld/drawing/drawn_group.js';
 import {FINE_LAYER} from 'hulld/drawing/stage.js';
-import {discTexture, THREE} from 'hulld/drawing/three.js';
+import {discMaterial, geometryFrom, THREE} from 'hulld/drawing/three.js';
 import {MARK_COLORS, RELATIONS} from 'hulld/palette.js';
 
 const FLASH_MS = 1200;
@@ -14,9 +14,8 @@ export function geometryOf(shape, kind) {
   geometries.set(shape, kinds);
   if (!kinds[kind]) {
     kinds.position ??= new THREE.BufferAttribute(shape.positions(), 3);
-    const geometry = new THREE.BufferGeometry();
-    geometry.setAttribute('position', kinds.position);
-    if (kind !== 'points') geometry.setIndex(new THREE.BufferAttribute(shape[kind], 1));
+    const {position} = kinds;
+    const geometry = geometryFrom({position}, kind === 'points' ? null : shape[kind]);
     geometry.boundingSphere = new THREE.Sphere(new THREE.Vector3(), shape.radius || 1e-9);
     kinds[kind] = geometry;
   }
@@ -81,13 +80,7 @@ export class ObjectView extends DrawnGroup {
 
   addPoints(shape) {
     const size = shape.vertexCount > 20000 ? 1.5 : 4;
-    const material = new THREE.PointsMaterial({
-      color: this.pointColor(),
-      size,
-      sizeAttenuation: false,
-      map: discTexture(),
-      alphaTest: 0.5,
-    });
+    const material = discMaterial({color: this.pointColor(), size, alphaTest: 0.5});
     const points = new THREE.Points(geometryOf(shape, 'points'), material);
     points.renderOrder = 2;
     this.shift(points, shape);
@@ -162,21 +155,16 @@ export class ObjectView extends DrawnGroup {
 
   // Highlights new vertices.
   flash(hull, indices) {
-    const geometry = new THREE.BufferGeometry();
-    const positions = new Float32Array(3 * indices.length);
-    indices.forEach((v, i) => {
-      for (let k = 0; k < 3; ++k) positions[3 * i + k] = hull.xyz[3 * v + k] - hull.center[k];
-    });
-    geometry.setAttribute('position', new THREE.BufferAttribute(positions, 3));
-    const material = new THREE.PointsMaterial({
+    const position = Float32Array.from(
+        indices.flatMap((v) => hull.center.map((value, k) => hull.xyz[3 * v + k] - value)));
+    const material = discMaterial({
       color: MARK_COLORS.flash,
       size: 11,
-      sizeAttenuation: false,
+      alphaTest: 0,
       transparent: true,
       depthTest: false,
-      map: discTexture(),
     });
-    const points = new THREE.Points(geometry, material);
+    const points = new THREE.Points(geometryFrom({position}), material);
     points.renderOrder = 6;
     points.userData.end = performance.now() + FLASH_MS;
     this.shift(points, hull);

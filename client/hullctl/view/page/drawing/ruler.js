@@ -1,7 +1,7 @@
 // Measures the distance between two picked points of objects. The points move with their objects.
 import {DrawnGroup} from 'hulld/drawing/drawn_group.js';
 import {pick} from 'hulld/drawing/picking.js';
-import {discTexture, THREE} from 'hulld/drawing/three.js';
+import {discMaterial, THREE} from 'hulld/drawing/three.js';
 import {short} from 'hulld/panels/dom.js';
 import {toWorld} from 'hulld/pose.js';
 import {difference} from 'hulld/vector.js';
@@ -60,13 +60,7 @@ export class Ruler extends DrawnGroup {
           this.points.map((point) => this.stage.local(point)));
       const common = {color: this.stage.theme.edge, depthTest: false, transparent: true};
       const line = new THREE.Line(geometry, new THREE.LineBasicMaterial(common));
-      const dots = new THREE.Points(geometry, new THREE.PointsMaterial({
-        ...common,
-        size: 8,
-        sizeAttenuation: false,
-        map: discTexture(),
-        alphaTest: 0.3,
-      }));
+      const dots = new THREE.Points(geometry, discMaterial({...common, size: 8}));
       line.renderOrder = dots.renderOrder = 10;
       this.group.add(line, dots);
     }

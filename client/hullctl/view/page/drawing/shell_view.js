@@ -1,8 +1,9 @@
 // Draws a simpler hull, instead of the selected one, with the shell of its proven error, or the
 // shell of the tolerance.
 import {DrawnGroup} from 'hulld/drawing/drawn_group.js';
-import {THREE} from 'hulld/drawing/three.js';
+import {geometryFrom, THREE} from 'hulld/drawing/three.js';
 import {MARK_COLORS} from 'hulld/palette.js';
+import {unit} from 'hulld/vector.js';
 
 // Shells of larger hulls have as many facets as the hull.
 const MAX_FACETS = 20000;
@@ -37,7 +38,8 @@ export class ShellView extends DrawnGroup {
     if (!object || object.hullId !== hullId) return;
     this.empty();
     this.object = object;
-    this.add(this.plain(simpler), simpler.center, {color: MARK_COLORS.witness, opacity: 0.35});
+    const geometry = geometryFrom({position: simpler.positions()}, simpler.triangles);
+    this.add(geometry, simpler.center, {color: MARK_COLORS.witness, opacity: 0.35});
     const inner = side === 'inside' ? simpler : this.model.hullOf(object);
     this.addShell(inner, simpler.error);
     this.place();
@@ -51,13 +53,6 @@ export class ShellView extends DrawnGroup {
     const hull = this.model.hullOf(this.object);
     if (hull?.dimension === 3 && !hull.isBody) this.addShell(hull, tolerance);
     this.place();
-  }
-
-  plain(hull) {
-    const geometry = new THREE.BufferGeometry();
-    geometry.setAttribute('position', new THREE.BufferAttribute(hull.positions(), 3));
-    geometry.setIndex(new THREE.BufferAttribute(hull.triangles, 1));
-    return geometry;
   }
 
   addShell(hull, distance) {
@@ -129,11 +124,7 @@ function shellGeometry(hull, distance) {
     if (back) indices.push(a, back[1], back[0], a, back[0], b);
   }
   for (const ring of around.values()) fillVertex(ring, indices);
-  const geometry = new THREE.BufferGeometry();
-  geometry.setAttribute('position', new THREE.BufferAttribute(new Float32Array(positions), 3));
-  geometry.setIndex(indices);
-  geometry.computeBoundingSphere();
-  return geometry;
+  return geometryFrom({position: new Float32Array(positions)}, new Uint32Array(indices));
 }
 
 // Returns a shell of a hull with many small facets, in linear time and memory. Each vertex moves
@@ -154,18 +145,14 @@ function fineShell(hull, distance) {
       normals[corner + 2] += nz;
     }
   }
-  const positions = new Float32Array(xyz.length);
+  const position = new Float32Array(xyz.length);
   for (let i = 0; i < xyz.length; i += 3) {
     const scale = distance / (Math.hypot(normals[i], normals[i + 1], normals[i + 2]) || 1);
     for (let k = 0; k < 3; ++k) {
-      positions[i + k] = xyz[i + k] - hull.center[k] + scale * normals[i + k];
+      position[i + k] = xyz[i + k] - hull.center[k] + scale * normals[i + k];
     }
   }
-  const geometry = new THREE.BufferGeometry();
-  geometry.setAttribute('position', new THREE.BufferAttribute(positions, 3));
-  geometry.setIndex(new THREE.BufferAttribute(triangles, 1));
-  geometry.computeBoundingSphere();
-  return geometry;
+  return geometryFrom({position}, triangles);
 }
 
 // Fills a fan over the copies of a vertex, in the order of the facets around it.
@@ -191,6 +178,5 @@ function normalOf(xyz, facet) {
       n[k] += (xyz[3 * v + p] - xyz[3 * w + p]) * (xyz[3 * v + q] + xyz[3 * w + q]);
     }
   });
-  const length = Math.hypot(...n) || 1;
-  return n.map((value) => value / length);
+  return unit(n);
 }

@@ -6,7 +6,7 @@
 import {fewVertices, hullTriangles} from 'hulld/drawing/convex_hull.js';
 import {DrawnGroup} from 'hulld/drawing/drawn_group.js';
 import {edgeWeight, geometryOf} from 'hulld/drawing/object_view.js';
-import {THREE} from 'hulld/drawing/three.js';
+import {geometryFrom, THREE} from 'hulld/drawing/three.js';
 import {RELATIONS} from 'hulld/palette.js';
 import {angleBetween, poseAt, toWorld} from 'hulld/pose.js';
 
@@ -53,12 +53,6 @@ function sweep(parts, center, poses, base) {
   return {corners, path: poses.flatMap((pose) => placed(pose, center))};
 }
 
-function geometryFrom(numbers) {
-  const geometry = new THREE.BufferGeometry();
-  geometry.setAttribute('position', new THREE.BufferAttribute(new Float32Array(numbers), 3));
-  return geometry;
-}
-
 export class SweepView extends DrawnGroup {
   // The geometry of each object that was drawn: {shape, base, surface, path}.
   known = new Map();
@@ -91,7 +85,9 @@ export class SweepView extends DrawnGroup {
     const base = toWorld(object.start, shape.center);
     const {corners, path} =
         sweep(this.partsOf(object, shape), shape.center, sampledPoses(object), base);
-    const made = {shape, base, surface: geometryFrom(corners), path: geometryFrom(path)};
+    const [surface, line] =
+        [corners, path].map((numbers) => geometryFrom({position: new Float32Array(numbers)}));
+    const made = {shape, base, surface, path: line};
     this.known.set(object, made);
     return made;
   }

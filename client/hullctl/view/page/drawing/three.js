@@ -18,13 +18,28 @@ function textureOf(size, draw) {
 
 // Draws points as discs; without the texture they are squares.
 let disc = null;
-export function discTexture() {
+function discTexture() {
   disc ??= textureOf(32, (context, size) => {
     context.fillStyle = '#fff';
     context.arc(size / 2, size / 2, size / 2 - 1, 0, 2 * Math.PI);
     context.fill();
   });
   return disc;
+}
+
+// Material of points as discs of a size in pixels.
+export const discMaterial = (options) => new THREE.PointsMaterial(
+    {sizeAttenuation: false, map: discTexture(), alphaTest: 0.3, ...options});
+
+// Creates a geometry of the attributes, and of the indices, if given.
+export function geometryFrom(attributes, index = null) {
+  const geometry = new THREE.BufferGeometry();
+  for (const [name, values] of Object.entries(attributes)) {
+    geometry.setAttribute(
+        name, values.isBufferAttribute ? values : new THREE.BufferAttribute(values, 3));
+  }
+  if (index) geometry.setIndex(new THREE.BufferAttribute(index, 1));
+  return geometry;
 }
 
 // A cell of a grid: a line at its border over a faint fill, in white.

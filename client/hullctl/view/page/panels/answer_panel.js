@@ -1,6 +1,6 @@
 // The server's answer about the pair, and about all pairs of the scene.
 import {MARK_COLORS, RELATIONS, RUNGS} from 'hulld/palette.js';
-import {details, element, facts, grouped, missingAnswer, quiet, rounded, short, slider, tag} from 'hulld/panels/dom.js';
+import {button, details, element, facts, grouped, missingAnswer, quiet, rounded, short, slider, tag} from 'hulld/panels/dom.js';
 import {ProofLine} from 'hulld/panels/proof_line.js';
 import {poseText} from 'hulld/pose.js';
 import {certificateProblem} from 'hulld/proof/certificate.js';
@@ -224,9 +224,9 @@ export class AnswerPanel {
       const names = `${model.objects[a].name} and ${model.objects[b].name}`;
       return element(
           'li', {},
-          element(
-              'button', {type: 'button', onclick: () => this.visit(a, b)},
-              element('span', {className: 'names'}, names), tag(RELATIONS[relation])));
+          button(
+              {onclick: () => this.visit(a, b)}, element('span', {className: 'names'}, names),
+              tag(RELATIONS[relation])));
     });
     if (count > rows.length)
       rows.push(element('li', {className: 'more'}, `and ${grouped(count - rows.length)} more`));

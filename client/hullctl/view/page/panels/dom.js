@@ -13,6 +13,9 @@ export function element(name, properties = {}, ...children) {
   return made;
 }
 
+export const button = (properties, ...children) =>
+    element('button', {type: 'button', ...properties}, ...children);
+
 // A remark below the facts, or in their place.
 export const quiet = (text) => element('p', {className: 'quiet'}, text);
 

@@ -1,5 +1,5 @@
 // The selected object: its pose, a simplification of its hull, and its properties.
-import {copy, details, element, facts, grouped, quiet, rounded, short, slider} from 'hulld/panels/dom.js';
+import {button, copy, details, element, facts, grouped, quiet, rounded, short, slider} from 'hulld/panels/dom.js';
 import {poseText} from 'hulld/pose.js';
 
 const SIDES = {
@@ -112,9 +112,8 @@ export class ObjectPanel {
   }
 
   rotationAndCopies(object, fields) {
-    const copyButton = (id, label, text) => element(
-        'button', {
-          type: 'button',
+    const copyButton = (id, label, text) => button(
+        {
           id,
           title: 'Copies the placement with exact numbers',
           onclick: async ({target}) => {

@@ -1,5 +1,5 @@
 // The result of checking a certificate in this page.
-import {element, grouped} from 'hulld/panels/dom.js';
+import {button, element, grouped} from 'hulld/panels/dom.js';
 
 // Checks of more steps than this run on demand: a million take seconds.
 const MAX_STEPS = 20000;
@@ -35,7 +35,7 @@ export class ProofLine {
       run();
     } else {
       const text = `Check the certificate here (${grouped(steps)} steps)`;
-      line.append(element('button', {type: 'button', onclick: run}, text));
+      line.append(button({onclick: run}, text));
     }
     return line;
   }

@@ -1,7 +1,7 @@
 // The tree of objects: search, select, show and hide, color. The prefixes of IDs, up to a slash,
 // form groups.
 import {RELATIONS} from 'hulld/palette.js';
-import {element, grouped, tag} from 'hulld/panels/dom.js';
+import {button, element, grouped, tag} from 'hulld/panels/dom.js';
 
 // More rows would slow down the page; the search finds the rest.
 const MAX_ROWS = 400;
@@ -109,16 +109,12 @@ export class Tree {
     const visible = members.some((object) => object.visible);
     return element(
         'div', {className: 'row group'},
-        element(
-            'button', {
-              type: 'button',
+        button(
+            {
               className: 'name',
               'aria-expanded': String(!closed),
               'data-row': `group ${group}`,
-              onclick: () => {
-                if (!this.closed.delete(group)) this.closed.add(group);
-                this.rebuild();
-              },
+              onclick: () => this.toggle(this.closed, group),
             },
             `${closed ? '\u25b8' : '\u25be'} ${name} `,
             element('span', {className: 'quiet'}, grouped(members.length))),
@@ -132,20 +128,21 @@ export class Tree {
     return Boolean(body) && isShort !== this.turned.has(index);
   }
 
+  toggle(set, key) {
+    if (!set.delete(key)) set.add(key);
+    this.rebuild();
+  }
+
   // Expands and collapses the list of a body's pieces.
   opener(object) {
     const isOpen = this.isOpen(object);
-    return element(
-        'button', {
-          type: 'button',
+    return button(
+        {
           className: 'eye',
           'aria-expanded': String(isOpen),
           'aria-label': `Pieces of ${object.name}`,
           'data-row': `pieces ${object.index}`,
-          onclick: () => {
-            if (!this.turned.delete(object.index)) this.turned.add(object.index);
-            this.rebuild();
-          },
+          onclick: () => this.toggle(this.turned, object.index),
         },
         isOpen ? '\u25be' : '\u25b8');
   }
@@ -189,9 +186,8 @@ export class Tree {
             model.tell('color');
           },
         }),
-        element(
-            'button', {
-              type: 'button',
+        button(
+            {
               className: 'name',
               title: object.name,
               'aria-pressed': String(isSelected),
@@ -219,9 +215,8 @@ export class Tree {
   }
 
   eye(visible, name, key, toggle) {
-    return element(
-        'button', {
-          type: 'button',
+    return button(
+        {
           className: 'eye',
           'data-row': key,
           'aria-label': `${visible ? 'Hide' : 'Show'} ${name}`,
