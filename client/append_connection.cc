@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "client/check.h"
+#include "client/base/check.h"
 
 namespace hulld {
 

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "client/append_connection.h"
+#include "client/base/status_macros.h"
 #include "client/calls/grpc_status.h"
 
 namespace hulld {
@@ -77,9 +78,7 @@ absl::StatusOr<v1::AppendOpened> Appender::Connect() {
 absl::Status Appender::OpenFirst() {
   const Deadline deadline = retry_.Now() + timeout_;
   absl::Status status = CallWithRetries(retry_, deadline, [this] {
-    absl::StatusOr<v1::AppendOpened> opened = Connect();
-    if (!opened.ok()) return opened.status();
-    opened_ = *std::move(opened);
+    HULLD_ASSIGN_OR_RETURN(opened_, Connect());
     return absl::OkStatus();
   });
   if (!status.ok()) return Fail(std::move(status));
@@ -154,14 +153,14 @@ absl::Status Appender::PumpUntil(size_t chunks, size_t bytes) {
   for (;;) {
     v1::AppendPointsResponse response;
     while (connection_->TakeResponse(&response)) {
-      if (absl::Status status = TakeResponse(response); !status.ok()) return status;
+      HULLD_RETURN_IF_ERROR(TakeResponse(response));
       deadline = std::chrono::steady_clock::now() + timeout_;
     }
     if (unacknowledged_.empty()) return absl::OkStatus();
     if (connection_->ended()) {
       // A response may have arrived between the two checks.
       if (connection_->TakeResponse(&response)) {
-        if (absl::Status status = TakeResponse(response); !status.ok()) return status;
+        HULLD_RETURN_IF_ERROR(TakeResponse(response));
         continue;
       }
       absl::Status status = EndOf(connection_.get());
@@ -222,7 +221,7 @@ void Appender::DropAcknowledged(uint64_t sequence, bool recovered) {
 
 absl::Status Appender::Finish() {
   if (!failed_.ok()) return failed_;
-  if (absl::Status status = PumpUntil(0, 0); !status.ok()) return status;
+  HULLD_RETURN_IF_ERROR(PumpUntil(0, 0));
   const Deadline deadline = std::chrono::steady_clock::now() + timeout_;
   if (!connection_->ended()) connection_->WritesDone();
   while (!connection_->ended()) {

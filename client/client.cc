@@ -1,6 +1,5 @@
 #include "client/client.h"
 
-#include <absl/strings/str_cat.h>
 #include <grpcpp/generic/generic_stub.h>
 
 #include <algorithm>
@@ -8,10 +7,10 @@
 #include <future>
 #include <utility>
 
+#include "client/base/status_macros.h"
 #include "client/calls/grpc_status.h"
 #include "client/point_messages.h"
 #include "client/server_address.h"
-#include "client/status_macros.h"
 
 namespace hulld {
 namespace {

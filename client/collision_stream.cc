@@ -1,7 +1,5 @@
 #include "client/collision_stream.h"
 
-#include <absl/strings/str_cat.h>
-
 #include <utility>
 
 #include "client/calls/grpc_status.h"

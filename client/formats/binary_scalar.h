@@ -25,23 +25,9 @@ enum class ScalarType {
 inline constexpr size_t kMaxScalarBytes = 8;
 
 constexpr size_t SizeOf(ScalarType type) {
-  switch (type) {
-    case ScalarType::kInt8:
-    case ScalarType::kUint8:
-      return 1;
-    case ScalarType::kInt16:
-    case ScalarType::kUint16:
-      return 2;
-    case ScalarType::kInt32:
-    case ScalarType::kUint32:
-    case ScalarType::kFloat:
-      return 4;
-    case ScalarType::kInt64:
-    case ScalarType::kUint64:
-    case ScalarType::kDouble:
-      return 8;
-  }
-  return 0;
+  // In the order of ScalarType.
+  constexpr size_t kSizes[] = {1, 1, 2, 2, 4, 4, 8, 8, 4, 8};
+  return kSizes[static_cast<size_t>(type)];
 }
 
 template <typename Scalar>

@@ -16,8 +16,10 @@ constexpr size_t kBufferBytes = size_t{256} << 10;
 
 }  // namespace
 
+std::string SourceName(const std::string& path) { return path == "-" ? "standard input" : path; }
+
 absl::StatusOr<std::unique_ptr<ByteSource>> ByteSource::Open(const std::string& path) {
-  if (path == "-") return std::make_unique<ByteSource>(dup(STDIN_FILENO), "standard input");
+  if (path == "-") return std::make_unique<ByteSource>(dup(STDIN_FILENO), SourceName(path));
   const int descriptor = open(path.c_str(), O_RDONLY | O_CLOEXEC);
   if (descriptor < 0) {
     const std::string message = absl::StrCat("cannot open ", path, ": ", strerror(errno));

@@ -103,6 +103,9 @@ class ByteSource {
   std::function<void(uint64_t)> progress_;
 };
 
+// Returns the name of a file in messages; "-" is standard input.
+std::string SourceName(const std::string& path);
+
 // Reads a whole text; each line is followed by LF. Errors are those of ByteSource.
 absl::StatusOr<std::string> ReadText(const std::string& path);
 

@@ -3,14 +3,12 @@
 #include <absl/strings/str_cat.h>
 
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <map>
 
-#include "client/formats/obj_reader.h"
-#include "client/formats/off_reader.h"
+#include "client/base/status_macros.h"
+#include "client/formats/mesh_readers.h"
 #include "client/formats/point_file.h"
-#include "client/formats/stl_reader.h"
 #include "client/formats/text_number.h"
 
 namespace hulld {
@@ -147,7 +145,7 @@ absl::Status ReadObjParts(ByteSource* source, std::vector<MeshPart>* parts) {
     // A new object starts without a group.
     group = keyword == "g" ? std::string(name) : "";
   };
-  if (absl::Status read = WalkObj(source, receiver); !read.ok()) return read;
+  HULLD_RETURN_IF_ERROR(WalkObj(source, receiver));
   *parts = Distribute(mesh, part_of, names);
   return absl::OkStatus();
 }
@@ -186,38 +184,35 @@ namespace {
 // Reads the parts of a format that names them.
 absl::Status ReadNamedParts(const std::string& path, PointFormat format,
                             std::vector<MeshPart>* parts) {
-  auto source = ByteSource::Open(path);
-  if (!source.ok()) return source.status();
-  if (absl::Status status = (*source)->CheckStart(); !status.ok()) return status;
+  HULLD_ASSIGN_OR_RETURN(auto source, ByteSource::Open(path));
+  HULLD_RETURN_IF_ERROR(source->CheckStart());
   switch (format) {
     case PointFormat::kObj:
-      return ReadObjParts(source->get(), parts);
+      return ReadObjParts(source.get(), parts);
     case PointFormat::kStl:
-      return ReadStlParts(source->get(), parts);
+      return ReadStlParts(source.get(), parts);
     case PointFormat::kGltf:
-      return ReadGltfParts(source->get(), parts);
+      return ReadGltfParts(source.get(), parts);
     default:
-      return ReadDaeParts(source->get(), parts);
+      return ReadDaeParts(source.get(), parts);
   }
 }
 
 }  // namespace
 
 absl::StatusOr<std::vector<MeshPart>> ReadParts(const std::string& path, SplitBy split) {
-  const absl::StatusOr<PointFormat> format = PointFormatOfPath(path);
-  if (!format.ok()) return format.status();
+  HULLD_ASSIGN_OR_RETURN(const PointFormat format, PointFormatOfPath(path));
   std::vector<MeshPart> parts;
   const bool has_names =
-      IsMeshFormat(*format) && *format != PointFormat::kOff && *format != PointFormat::kPly;
+      IsMeshFormat(format) && format != PointFormat::kOff && format != PointFormat::kPly;
   if (split == SplitBy::kComponent || !has_names) {
-    const auto mesh = ReadMesh(path);
-    if (!mesh.ok()) return mesh.status();
+    HULLD_ASSIGN_OR_RETURN(const auto mesh, ReadMesh(path));
     if (split == SplitBy::kComponent) {
-      parts = Components(*mesh);
-    } else if (!mesh->triangles.empty()) {
-      parts.push_back({"", *mesh});
+      parts = Components(mesh);
+    } else if (!mesh.triangles.empty()) {
+      parts.push_back({"", mesh});
     }
-  } else if (absl::Status read = ReadNamedParts(path, *format, &parts); !read.ok()) {
+  } else if (absl::Status read = ReadNamedParts(path, format, &parts); !read.ok()) {
     return read;
   }
   std::erase_if(parts, [](const MeshPart& part) { return part.mesh.triangles.empty(); });
@@ -227,54 +222,47 @@ absl::StatusOr<std::vector<MeshPart>> ReadParts(const std::string& path, SplitBy
 
 absl::Status ReadOffMesh(ByteSource* source, TriangleMesh* mesh) {
   OffReader reader(source);
-  if (absl::Status status = reader.ReadHeader(); !status.ok()) return status;
+  HULLD_RETURN_IF_ERROR(reader.ReadHeader());
   std::string_view content;
   for (uint64_t i = 0; i < reader.vertex_count(); ++i) {
-    absl::Status status = reader.NextVertex(i, &content);
-    if (status.ok()) status = AddVertex(*source, content, mesh);
-    if (!status.ok()) return status;
+    HULLD_RETURN_IF_ERROR(reader.NextVertex(i, &content));
+    HULLD_RETURN_IF_ERROR(AddVertex(*source, content, mesh));
   }
   std::vector<uint32_t> corners;
   for (uint64_t i = 0; i < reader.face_count(); ++i) {
-    if (absl::Status status = reader.NextFace(i, &corners); !status.ok()) return status;
+    HULLD_RETURN_IF_ERROR(reader.NextFace(i, &corners));
     AddPolygon(corners, mesh);
   }
   return reader.Finish();
 }
 
 absl::StatusOr<TriangleMesh> ReadMesh(const std::string& path) {
-  const absl::StatusOr<PointFormat> format = PointFormatOfPath(path);
-  if (!format.ok()) return format.status();
-  auto source = ByteSource::Open(path);
-  if (!source.ok()) return source.status();
-  absl::Status status = (*source)->CheckStart();
-  if (!status.ok()) return status;
+  HULLD_ASSIGN_OR_RETURN(const PointFormat format, PointFormatOfPath(path));
+  HULLD_ASSIGN_OR_RETURN(auto source, ByteSource::Open(path));
+  HULLD_RETURN_IF_ERROR(source->CheckStart());
   TriangleMesh mesh;
-  switch (*format) {
+  switch (format) {
     case PointFormat::kObj:
-      status = ReadObjMesh(source->get(), &mesh);
+      HULLD_RETURN_IF_ERROR(ReadObjMesh(source.get(), &mesh));
       break;
     case PointFormat::kOff:
-      status = ReadOffMesh(source->get(), &mesh);
+      HULLD_RETURN_IF_ERROR(ReadOffMesh(source.get(), &mesh));
       break;
     case PointFormat::kPly:
-      status = ReadPlyMesh(source->get(), &mesh);
+      HULLD_RETURN_IF_ERROR(ReadPlyMesh(source.get(), &mesh));
       break;
     case PointFormat::kStl:
     case PointFormat::kGltf:
     case PointFormat::kDae: {
       std::vector<MeshPart> parts;
-      status = ReadNamedParts(path, *format, &parts);
-      for (size_t i = 0; i < parts.size() && status.ok(); ++i) {
-        status = AddMesh(path, parts[i].mesh, &mesh);
-      }
+      HULLD_RETURN_IF_ERROR(ReadNamedParts(path, format, &parts));
+      for (const MeshPart& part : parts) HULLD_RETURN_IF_ERROR(AddMesh(path, part.mesh, &mesh));
       break;
     }
     default:
-      status = absl::InvalidArgumentError(absl::StrCat(
+      return absl::InvalidArgumentError(absl::StrCat(
           path, ": meshes are read from obj, off, ply, stl, gltf and dae; convert the file"));
   }
-  if (!status.ok()) return status;
   return mesh;
 }
 

@@ -4,7 +4,7 @@
 #include <limits>
 #include <string>
 
-#include "client/formats/obj_reader.h"
+#include "client/formats/mesh_readers.h"
 #include "client/formats/point_file.h"
 #include "client/formats/text_number.h"
 

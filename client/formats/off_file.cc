@@ -1,6 +1,6 @@
 #include <absl/strings/str_cat.h>
 
-#include "client/formats/off_reader.h"
+#include "client/formats/mesh_readers.h"
 #include "client/formats/point_file.h"
 #include "client/formats/text_number.h"
 

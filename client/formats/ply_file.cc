@@ -10,8 +10,10 @@
 #include <limits>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "client/base/status_macros.h"
 #include "client/formats/binary_scalar.h"
 #include "client/formats/mesh_file.h"
 #include "client/formats/point_file.h"
@@ -52,11 +54,7 @@ struct PlyHeader {
 };
 
 std::optional<ScalarType> TypeFromName(std::string_view name) {
-  struct Name {
-    std::string_view name;
-    ScalarType type;
-  };
-  static constexpr Name kNames[] = {
+  static constexpr std::pair<std::string_view, ScalarType> kNames[] = {
       {"char", ScalarType::kInt8},     {"int8", ScalarType::kInt8},
       {"uchar", ScalarType::kUint8},   {"uint8", ScalarType::kUint8},
       {"short", ScalarType::kInt16},   {"int16", ScalarType::kInt16},
@@ -67,8 +65,8 @@ std::optional<ScalarType> TypeFromName(std::string_view name) {
       {"float", ScalarType::kFloat},   {"float32", ScalarType::kFloat},
       {"double", ScalarType::kDouble}, {"float64", ScalarType::kDouble},
   };
-  for (const Name& entry : kNames) {
-    if (entry.name == name) return entry.type;
+  for (const auto& [known, type] : kNames) {
+    if (known == name) return type;
   }
   return std::nullopt;
 }
@@ -78,18 +76,17 @@ absl::Status ParseFormat(const ByteSource& source, std::string_view rest, PlyHea
   if (header->encoding != Encoding::kNone) {
     return source.ErrorAtLine("the header has the line \"format\" twice");
   }
-  if (encoding == "ascii") {
-    header->encoding = Encoding::kAscii;
-  } else if (encoding == "binary_little_endian") {
-    header->encoding = Encoding::kLittleEndian;
-  } else if (encoding == "binary_big_endian") {
-    header->encoding = Encoding::kBigEndian;
-  } else {
-    return source.ErrorAtLine(absl::StrCat(
-        "format ", Quoted(encoding),
-        " is unknown; supported are ascii, binary_little_endian and binary_big_endian"));
+  static constexpr std::pair<std::string_view, Encoding> kEncodings[] = {
+      {"ascii", Encoding::kAscii},
+      {"binary_little_endian", Encoding::kLittleEndian},
+      {"binary_big_endian", Encoding::kBigEndian}};
+  for (const auto& [name, known] : kEncodings) {
+    if (encoding == name) header->encoding = known;
   }
-  return absl::OkStatus();
+  if (header->encoding != Encoding::kNone) return absl::OkStatus();
+  return source.ErrorAtLine(
+      absl::StrCat("format ", Quoted(encoding),
+                   " is unknown; supported are ascii, binary_little_endian and binary_big_endian"));
 }
 
 absl::Status ParseElement(const ByteSource& source, std::string_view rest, PlyHeader* header) {
@@ -200,8 +197,7 @@ class AsciiBody {
     for (const Property& property : element.properties) {
       if (!NextValue(&token)) return source_->Truncated("within the element " + element.name);
       if (property.count_type) {
-        absl::Status status = ReadList(element, token, property.is_corners ? corners : nullptr);
-        if (!status.ok()) return status;
+        HULLD_RETURN_IF_ERROR(ReadList(element, token, property.is_corners ? corners : nullptr));
         continue;
       }
       // Other values, such as a "1.#QNAN" in a normal, are not checked.
@@ -459,7 +455,7 @@ absl::StatusOr<const Element*> FindVertex(const ByteSource& source, const PlyHea
     vertex = &element;
   }
   if (vertex == nullptr) return source.ErrorAtLine("the header declares no element vertex");
-  if (absl::Status status = CheckVertex(source, *vertex); !status.ok()) return status;
+  HULLD_RETURN_IF_ERROR(CheckVertex(source, *vertex));
   if (vertex->count > 0) return vertex;
   for (const Element& element : header.elements) {
     if (element.count == 0 || element.properties.empty()) continue;
@@ -473,16 +469,15 @@ absl::StatusOr<const Element*> FindVertex(const ByteSource& source, const PlyHea
 
 absl::Status ReadPly(ByteSource* source, PointCollector* points) {
   PlyHeader header;
-  if (absl::Status status = ParsePlyHeader(source, &header); !status.ok()) return status;
+  HULLD_RETURN_IF_ERROR(ParsePlyHeader(source, &header));
   if (const auto vertex = FindVertex(*source, header); !vertex.ok()) return vertex.status();
   return ReadBody(source, header, points->scale(), PointSink(points));
 }
 
 absl::Status ReadPlyMesh(ByteSource* source, TriangleMesh* mesh) {
   PlyHeader header;
-  if (absl::Status status = ParsePlyHeader(source, &header); !status.ok()) return status;
-  const auto vertex = FindVertex(*source, header);
-  if (!vertex.ok()) return vertex.status();
+  HULLD_RETURN_IF_ERROR(ParsePlyHeader(source, &header));
+  HULLD_ASSIGN_OR_RETURN(const auto vertex, FindVertex(*source, header));
   bool has_faces = false;
   for (const Element& element : header.elements) {
     if (element.count == 0 || (element.name != kFaces && element.name != kStrips)) continue;
@@ -493,10 +488,10 @@ absl::Status ReadPlyMesh(ByteSource* source, TriangleMesh* mesh) {
     has_faces = true;
   }
   if (!has_faces) return absl::OkStatus();
-  if ((*vertex)->count > std::numeric_limits<uint32_t>::max()) {
+  if (vertex->count > std::numeric_limits<uint32_t>::max()) {
     return source->ErrorAtLine("too many vertices");
   }
-  return ReadBody(source, header, {}, MeshSink((*vertex)->count, mesh));
+  return ReadBody(source, header, {}, MeshSink(vertex->count, mesh));
 }
 
 }  // namespace hulld

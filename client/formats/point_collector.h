@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "client/formats/length_scale.h"
+#include "client/formats/text_number.h"
 
 namespace hulld {
 

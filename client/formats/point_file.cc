@@ -5,7 +5,7 @@
 #include <absl/strings/str_join.h>
 
 #include <array>
-#include <utility>
+#include <iterator>
 
 #include "client/formats/text_number.h"
 
@@ -27,31 +27,11 @@ constexpr FormatName kFormatNames[] = {
     {"laz", PointFormat::kLas}, {"xyzn", PointFormat::kXyz},  {"xyzrgb", PointFormat::kXyz},
 };
 
-absl::Status ReadFormat(PointFormat format, ByteSource* source, PointCollector* points) {
-  switch (format) {
-    case PointFormat::kObj:
-      return ReadObj(source, points);
-    case PointFormat::kOff:
-      return ReadOff(source, points);
-    case PointFormat::kPly:
-      return ReadPly(source, points);
-    case PointFormat::kXyz:
-      return ReadXyz(source, points);
-    case PointFormat::kCsv:
-      return ReadCsv(source, points);
-    case PointFormat::kPcd:
-      return ReadPcd(source, points);
-    case PointFormat::kLas:
-      return ReadLas(source, points);
-    case PointFormat::kStl:
-      return ReadStl(source, points);
-    case PointFormat::kGltf:
-      return ReadGltf(source, points);
-    case PointFormat::kDae:
-      return ReadDae(source, points);
-  }
-  return absl::InternalError("unknown format");
-}
+using PointReader = absl::Status (*)(ByteSource* source, PointCollector* points);
+// In the order of PointFormat.
+constexpr PointReader kReaders[] = {ReadObj, ReadOff, ReadPly, ReadXyz,  ReadCsv,
+                                    ReadPcd, ReadLas, ReadStl, ReadGltf, ReadDae};
+static_assert(std::size(kReaders) == static_cast<size_t>(PointFormat::kDae) + 1);
 
 }  // namespace
 
@@ -97,7 +77,7 @@ absl::StatusOr<ReadCounts> ReadPoints(const ReadRequest& request, const BlockRec
   (*source)->ReportProgress(request.progress);
   PointCollector points(request.options, receive);
   absl::Status status = (*source)->CheckStart();
-  if (status.ok()) status = ReadFormat(request.format, source->get(), &points);
+  if (status.ok()) status = kReaders[static_cast<size_t>(request.format)](source->get(), &points);
   if (status.ok()) status = points.Flush();
   if (!status.ok()) return status;
   const ReadCounts& counts = points.counts();

@@ -7,8 +7,9 @@
 #include <limits>
 #include <string>
 
+#include "client/formats/mesh_readers.h"
 #include "client/formats/point_file.h"
-#include "client/formats/stl_reader.h"
+#include "client/formats/text_number.h"
 
 namespace hulld {
 namespace {

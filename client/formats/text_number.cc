@@ -236,4 +236,12 @@ std::string NumberProblem(NumberText kind, std::string_view text) {
   return problem;
 }
 
+absl::StatusOr<double> ParseFinite(std::string_view text) {
+  double number = 0;
+  const NumberText kind = ParseDouble(text, &number);
+  if (kind != NumberText::kNumber) return absl::InvalidArgumentError(NumberProblem(kind, text));
+  if (std::isfinite(number)) return number;
+  return absl::InvalidArgumentError(Quoted(text) + " is not a finite number");
+}
+
 }  // namespace hulld

@@ -1,7 +1,7 @@
 #ifndef HULLD_CLIENT_FORMATS_TEXT_NUMBER_H_
 #define HULLD_CLIENT_FORMATS_TEXT_NUMBER_H_
 
-#include <absl/status/status.h>
+#include <absl/status/statusor.h>
 
 #include <cstddef>
 #include <cstdint>
@@ -72,6 +72,9 @@ std::string Counted(uint64_t count, const std::string& noun, const std::string& 
 // Returns a message of protobuf's JSON parser in one line. The parser appends an excerpt of the
 // input, and a mark below the place of the error.
 std::string JsonProblem(std::string_view message);
+
+// Parses a finite number. INVALID_ARGUMENT: the defect, as in `"abc" is not a number`.
+absl::StatusOr<double> ParseFinite(std::string_view text);
 
 // Returns the defect in the text of a coordinate, such as `"abc" is not a number`.
 std::string NumberProblem(NumberText kind, std::string_view text);

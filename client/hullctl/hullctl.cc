@@ -7,22 +7,14 @@
 #include <memory>
 #include <optional>
 #include <sstream>
-#include <utility>
 
-#include "client/hullctl/body/body_command.h"
 #include "client/hullctl/command_line/arguments.h"
 #include "client/hullctl/command_line/command.h"
+#include "client/hullctl/command_line/commands.h"
 #include "client/hullctl/command_line/connection.h"
-#include "client/hullctl/command_line/exit_code.h"
 #include "client/hullctl/command_line/invocation.h"
-#include "client/hullctl/commands/commands.h"
 #include "client/hullctl/completion/completion.h"
-#include "client/hullctl/completion/completion_script.h"
-#include "client/hullctl/completion/completion_values.h"
 #include "client/hullctl/local/local_server.h"
-#include "client/hullctl/pairs/judge_command.h"
-#include "client/hullctl/parts/cover_command.h"
-#include "client/hullctl/robot/robot_commands.h"
 
 namespace hulld {
 namespace {
@@ -62,7 +54,7 @@ void AddGlobalOptions(Command program, Invocation* invocation) {
 }
 
 // Groups of the help, and their commands. A new command adds a line here and a declaration in
-// commands/commands.h; the rest is in its own file.
+// command_line/commands.h; the rest is in its own file.
 void AddCommands(Command program, Invocation* invocation) {
   program.BeginGroup("Build hulls");
   AddCreateCommand(program, invocation);
@@ -159,9 +151,7 @@ absl::StatusOr<std::unique_ptr<LocalServer>> StartLocal(Invocation* invocation) 
 ExitCode RunAction(Invocation* invocation) {
   std::unique_ptr<LocalServer> local;
   if (invocation->needs_server && invocation->local) {
-    auto started = StartLocal(invocation);
-    if (!started.ok()) return invocation->FailUsage(started.status());
-    local = *std::move(started);
+    HULLD_ASSIGN_OR_FAIL(invocation->FailUsage, local, StartLocal(invocation));
   } else if (invocation->needs_server) {
     const absl::Status resolved = ResolveConnection(invocation);
     if (!resolved.ok()) return invocation->FailUsage(resolved);

@@ -5,9 +5,8 @@
 #include <absl/strings/str_join.h>
 
 #include <algorithm>
-#include <cmath>
-#include <string_view>
 
+#include "client/base/status_macros.h"
 #include "client/formats/text_number.h"
 
 namespace hulld {
@@ -46,8 +45,7 @@ std::string NamesOf(const std::vector<JointVariable>& variables) {
 // Returns the index of the variable that a column names.
 absl::StatusOr<int> PlaceOf(const Robot& robot, const std::vector<JointVariable>& variables,
                             const std::string& name) {
-  const auto variable = std::find_if(variables.begin(), variables.end(),
-                                     [&](const JointVariable& one) { return one.name == name; });
+  const auto variable = std::ranges::find(variables, name, &JointVariable::name);
   if (variable != variables.end()) return static_cast<int>(variable - variables.begin());
   const int joint = robot.FindJoint(name);
   if (joint < 0) {
@@ -107,11 +105,9 @@ absl::StatusOr<WaypointReader> WaypointReader::Open(ByteSource* source, const Ro
       }
       const auto place = PlaceOf(robot, variables, std::string(cell));
       if (!place.ok()) {
-        return source->ErrorAtLine(
-            std::string(place.status().message().data(), place.status().message().size()));
+        return source->ErrorAtLine(std::string(place.status().message()));
       }
-      if (std::find(reader.columns_.begin(), reader.columns_.end(), *place) !=
-          reader.columns_.end()) {
+      if (std::ranges::find(reader.columns_, *place) != reader.columns_.end()) {
         return source->ErrorAtLine(Quoted(cell) + " has two columns; remove one");
       }
       reader.columns_.push_back(*place);
@@ -124,8 +120,7 @@ absl::StatusOr<WaypointReader> WaypointReader::Open(ByteSource* source, const Ro
     return absl::InvalidArgumentError(
         absl::StrCat(source->name(), ": no header with joint names; start the file with one"));
   }
-  absl::Status good = CheckRotations(*source, robot, variables, reader.columns_);
-  if (!good.ok()) return good;
+  HULLD_RETURN_IF_ERROR(CheckRotations(*source, robot, variables, reader.columns_));
   return reader;
 }
 
@@ -142,12 +137,9 @@ absl::StatusOr<bool> WaypointReader::Next(std::vector<double>* free_values) {
     *free_values = rest_;
     for (size_t i = 0; i < cells.size(); ++i) {
       if (columns_[i] < 0) continue;
-      double* const value = &(*free_values)[static_cast<size_t>(columns_[i])];
-      const NumberText kind = ParseDouble(cells[i], value);
-      if (kind != NumberText::kNumber) return source_->ErrorAtLine(NumberProblem(kind, cells[i]));
-      if (!std::isfinite(*value)) {
-        return source_->ErrorAtLine(Quoted(cells[i]) + " is not a finite number");
-      }
+      const auto value = ParseFinite(cells[i]);
+      if (!value.ok()) return source_->ErrorAtLine(std::string(value.status().message()));
+      (*free_values)[static_cast<size_t>(columns_[i])] = *value;
     }
     const std::string joint = JointWithoutRotation(*robot_, *free_values);
     if (joint.empty()) return true;

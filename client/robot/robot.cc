@@ -59,8 +59,7 @@ RigidPose MotionOf(const RobotJoint& joint, const JointValue& value) {
 
 template <typename Named>
 int IndexOf(const std::vector<Named>& all, const std::string& name) {
-  const auto found =
-      std::find_if(all.begin(), all.end(), [&](const Named& one) { return one.name == name; });
+  const auto found = std::ranges::find(all, name, &Named::name);
   return found == all.end() ? -1 : static_cast<int>(found - all.begin());
 }
 

@@ -15,17 +15,6 @@ namespace {
 // 2^-53 each. Proven: 64 operations lose less than 2^-46 of a length.
 constexpr double kOutward = 1 + 0x1p-46;
 
-ShapeHull BoxHull(const CollisionShape& box) {
-  ShapeHull hull;
-  for (const int corner : {0, 1, 2, 3, 4, 5, 6, 7}) {
-    for (size_t axis = 0; axis < 3; ++axis) {
-      const double half = box.size[axis] / 2;
-      hull.xyz.push_back((corner >> axis) % 2 == 0 ? -half : half);
-    }
-  }
-  return hull;
-}
-
 ShapeHull CylinderHull(const CollisionShape& cylinder) {
   ShapeHull hull;
   // Ratio of the distance of a regular polygon's sides from its center to that of its corners.
@@ -42,10 +31,21 @@ ShapeHull CylinderHull(const CollisionShape& cylinder) {
 
 }  // namespace
 
+std::vector<double> BoxCorners(std::span<const double, 3> size) {
+  std::vector<double> xyz;
+  for (const int corner : {0, 1, 2, 3, 4, 5, 6, 7}) {
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const double half = size[axis] / 2;
+      xyz.push_back((corner >> axis) % 2 == 0 ? -half : half);
+    }
+  }
+  return xyz;
+}
+
 ShapeHull PrimitiveHull(const CollisionShape& shape) {
   switch (shape.kind) {
     case ShapeKind::kBox:
-      return BoxHull(shape);
+      return {BoxCorners(shape.size)};
     case ShapeKind::kCylinder:
       return CylinderHull(shape);
     case ShapeKind::kSphere:
@@ -64,13 +64,11 @@ absl::StatusOr<ShapeHull> MeshHull(const CollisionShape& shape, const std::strin
     return absl::InvalidArgumentError(
         absl::StrCat(file, ": meshes are read from obj, stl, ply, off, gltf and dae; convert it"));
   }
-  ShapeHull hull;
   ReadRequest request{file, *format, {}, {}};
   request.options.scale = shape.scale;
   auto xyz = ReadAllPoints(request);
   if (!xyz.ok()) return xyz.status();
-  hull.xyz = *std::move(xyz);
-  return hull;
+  return ShapeHull{*std::move(xyz)};
 }
 
 }  // namespace hulld

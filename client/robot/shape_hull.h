@@ -3,6 +3,7 @@
 
 #include <absl/status/statusor.h>
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -27,6 +28,9 @@ struct ShapeHull {
 // Requires sizes of at least 0, as ReadUrdf ensures, and no mesh.
 ShapeHull PrimitiveHull(const CollisionShape& shape);
 inline constexpr int kCylinderSides = 32;
+
+// Returns the corners of a box with these edge lengths, centered on the origin.
+std::vector<double> BoxCorners(std::span<const double, 3> size);
 
 // Returns the vertices of the mesh in `file`, each coordinate times its factor of the scale,
 // rounded to the nearest double. INVALID_ARGUMENT names the file and its defect.

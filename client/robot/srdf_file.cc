@@ -1,10 +1,11 @@
 #include "client/robot/srdf_file.h"
 
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_replace.h>
 
 #include <algorithm>
-#include <memory>
 
+#include "client/base/status_macros.h"
 #include "client/formats/byte_source.h"
 #include "client/formats/text_number.h"
 #include "client/robot/xml_document.h"
@@ -25,31 +26,13 @@ absl::StatusOr<int> LinkOf(const XmlDocument& document, pugi::xml_node element,
 
 absl::StatusOr<LinkPair> PairOf(const XmlDocument& document, pugi::xml_node element,
                                 const Robot& robot) {
-  const auto a = LinkOf(document, element, "link1", robot);
-  if (!a.ok()) return a.status();
-  const auto b = LinkOf(document, element, "link2", robot);
-  if (!b.ok()) return b.status();
-  return MakeLinkPair(*a, *b);
+  HULLD_ASSIGN_OR_RETURN(const auto a, LinkOf(document, element, "link1", robot));
+  HULLD_ASSIGN_OR_RETURN(const auto b, LinkOf(document, element, "link2", robot));
+  return MakeLinkPair(a, b);
 }
 
 std::string Escaped(const std::string& text) {
-  std::string escaped;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        escaped += "&amp;";
-        break;
-      case '<':
-        escaped += "&lt;";
-        break;
-      case '"':
-        escaped += "&quot;";
-        break;
-      default:
-        escaped += c;
-    }
-  }
-  return escaped;
+  return absl::StrReplaceAll(text, {{"&", "&amp;"}, {"<", "&lt;"}, {"\"", "&quot;"}});
 }
 
 }  // namespace
@@ -58,34 +41,29 @@ LinkPair MakeLinkPair(int a, int b) { return {std::min(a, b), std::max(a, b)}; }
 
 absl::StatusOr<std::set<LinkPair>> ParseDisabledPairs(const std::string& text,
                                                       const std::string& name, const Robot& robot) {
-  const auto document = ParseXml(text, name, "robot");
-  if (!document.ok()) return document.status();
-  const pugi::xml_node root = (*document)->root();
+  HULLD_ASSIGN_OR_RETURN(const auto document, ParseXml(text, name, "robot"));
+  const pugi::xml_node root = document->root();
   std::set<LinkPair> pairs;
   for (const pugi::xml_node element : root.children("disable_default_collisions")) {
-    const auto link = LinkOf(**document, element, "link", robot);
-    if (!link.ok()) return link.status();
+    HULLD_ASSIGN_OR_RETURN(const auto link, LinkOf(*document, element, "link", robot));
     for (int other = 0; other < static_cast<int>(robot.links.size()); ++other) {
-      if (other != *link) pairs.insert(MakeLinkPair(*link, other));
+      if (other != link) pairs.insert(MakeLinkPair(link, other));
     }
   }
   for (const pugi::xml_node element : root.children("enable_collisions")) {
-    const auto pair = PairOf(**document, element, robot);
-    if (!pair.ok()) return pair.status();
-    pairs.erase(*pair);
+    HULLD_ASSIGN_OR_RETURN(const auto pair, PairOf(*document, element, robot));
+    pairs.erase(pair);
   }
   for (const pugi::xml_node element : root.children("disable_collisions")) {
-    const auto pair = PairOf(**document, element, robot);
-    if (!pair.ok()) return pair.status();
-    pairs.insert(*pair);
+    HULLD_ASSIGN_OR_RETURN(const auto pair, PairOf(*document, element, robot));
+    pairs.insert(pair);
   }
   return pairs;
 }
 
 absl::StatusOr<std::set<LinkPair>> ReadDisabledPairs(const std::string& path, const Robot& robot) {
-  const auto text = ReadText(path);
-  if (!text.ok()) return text.status();
-  return ParseDisabledPairs(*text, path == "-" ? "standard input" : path, robot);
+  HULLD_ASSIGN_OR_RETURN(const auto text, ReadText(path));
+  return ParseDisabledPairs(text, SourceName(path), robot);
 }
 
 std::set<LinkPair> AdjacentPairs(const Robot& robot) {

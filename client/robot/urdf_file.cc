@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "client/base/status_macros.h"
 #include "client/formats/byte_source.h"
 #include "client/formats/text_number.h"
 #include "client/robot/xml_document.h"
@@ -72,21 +73,20 @@ class UrdfReader {
       return document_.ErrorAt(root, "<robot> lacks name=\"...\"");
     }
     for (const pugi::xml_node link : root.children("link")) {
-      if (absl::Status good = TakeLink(link); !good.ok()) return good;
+      HULLD_RETURN_IF_ERROR(TakeLink(link));
     }
     if (links_.empty()) return document_.ErrorAt(root, "<robot> has no <link>");
     for (const pugi::xml_node joint : root.children("joint")) {
-      if (absl::Status good = TakeJoint(joint); !good.ok()) return good;
+      HULLD_RETURN_IF_ERROR(TakeJoint(joint));
     }
     for (auto& [name, joint] : joints_) {
-      if (absl::Status good = TakeMimic(&joint); !good.ok()) return good;
+      HULLD_RETURN_IF_ERROR(TakeMimic(&joint));
     }
     for (const auto& [name, joint] : joints_) {
-      if (absl::Status good = CheckMimicChain(joint); !good.ok()) return good;
+      HULLD_RETURN_IF_ERROR(CheckMimicChain(joint));
     }
-    const auto top = FindRoot();
-    if (!top.ok()) return top.status();
-    Robot robot = Assemble(*top);
+    HULLD_ASSIGN_OR_RETURN(const auto top, FindRoot());
+    Robot robot = Assemble(top);
     robot.name = root.attribute("name").value();
     return robot;
   }
@@ -140,14 +140,13 @@ class UrdfReader {
   }
 
   absl::Status TakeLink(pugi::xml_node element) {
-    const auto name = NameOf(element);
-    if (!name.ok()) return name.status();
-    const auto [entry, is_new] = links_.try_emplace(*name);
+    HULLD_ASSIGN_OR_RETURN(const auto name, NameOf(element));
+    const auto [entry, is_new] = links_.try_emplace(name);
     if (!is_new) return DefinedTwice(element, entry->second.element);
     entry->second.element = element;
     for (const pugi::xml_node collision : element.children("collision")) {
       CollisionShape& shape = entry->second.shapes.emplace_back();
-      if (absl::Status good = TakeCollision(collision, &shape); !good.ok()) return good;
+      HULLD_RETURN_IF_ERROR(TakeCollision(collision, &shape));
     }
     return absl::OkStatus();
   }
@@ -163,21 +162,19 @@ class UrdfReader {
                                                     "; attributes are xyz, rpy, and quat_xyzw"));
     }
     if (origin.attribute("rpy")) {
-      const auto rpy = NumbersOf(document_, origin, "rpy", 3);
-      if (!rpy.ok()) return rpy.status();
-      *pose = RotationOfUrdf((*rpy)[0], (*rpy)[1], (*rpy)[2]);
+      HULLD_ASSIGN_OR_RETURN(const auto rpy, NumbersOf(document_, origin, "rpy", 3));
+      *pose = RotationOfUrdf(rpy[0], rpy[1], rpy[2]);
     }
     if (origin.attribute("quat_xyzw")) {
       if (origin.attribute("rpy")) {
         return document_.ErrorAt(origin, "<origin> has both rpy and quat_xyzw; remove one");
       }
-      const auto q = NumbersOf(document_, origin, "quat_xyzw", 4);
-      if (!q.ok()) return q.status();
-      const double squared = std::inner_product(q->begin(), q->end(), q->begin(), 0.0);
+      HULLD_ASSIGN_OR_RETURN(const auto q, NumbersOf(document_, origin, "quat_xyzw", 4));
+      const double squared = std::inner_product(q.begin(), q.end(), q.begin(), 0.0);
       if (!(squared > 0 && std::isfinite(squared))) {
         return document_.ErrorAt(origin, "<origin> quat_xyzw is not a unit quaternion");
       }
-      *pose = Normalized((*q)[0], (*q)[1], (*q)[2], (*q)[3]);
+      *pose = Normalized(q[0], q[1], q[2], q[3]);
     }
     if (!origin.attribute("xyz")) return absl::OkStatus();
     const auto xyz = NumbersOf(document_, origin, "xyz", 3);
@@ -187,8 +184,8 @@ class UrdfReader {
 
   absl::Status TakeCollision(pugi::xml_node collision, CollisionShape* shape) const {
     shape->line = document_.LineOf(collision);
-    if (absl::Status good = CheckUnique(collision, {"origin", "geometry"}); !good.ok()) return good;
-    if (absl::Status good = TakeOrigin(collision, &shape->X_LS); !good.ok()) return good;
+    HULLD_RETURN_IF_ERROR(CheckUnique(collision, {"origin", "geometry"}));
+    HULLD_RETURN_IF_ERROR(TakeOrigin(collision, &shape->X_LS));
     const pugi::xml_node geometry = collision.child("geometry");
     if (!geometry) return document_.ErrorAt(collision, "<collision> lacks <geometry>");
     const auto is_element = [](pugi::xml_node child) { return child.type() == pugi::node_element; };
@@ -208,20 +205,17 @@ class UrdfReader {
     shape->kind = *kind;
     if (*kind == ShapeKind::kMesh) return TakeMesh(element, shape);
     if (*kind == ShapeKind::kBox) return TakeSizes(element, "size", shape->size);
-    absl::Status good = TakeSizes(element, "radius", {&shape->radius, 1});
-    if (good.ok() && *kind != ShapeKind::kSphere) {
-      good = TakeSizes(element, "length", {&shape->length, 1});
-    }
-    return good;
+    HULLD_RETURN_IF_ERROR(TakeSizes(element, "radius", {&shape->radius, 1}));
+    if (*kind == ShapeKind::kSphere) return absl::OkStatus();
+    return TakeSizes(element, "length", {&shape->length, 1});
   }
 
   absl::Status TakeMesh(pugi::xml_node mesh, CollisionShape* shape) const {
     shape->mesh = mesh.attribute("filename").value();
     if (shape->mesh.empty()) return document_.ErrorAt(mesh, "<mesh> lacks filename=\"...\"");
     if (!mesh.attribute("scale")) return absl::OkStatus();
-    const auto numbers = NumbersOf(document_, mesh, "scale", 3);
-    if (!numbers.ok()) return numbers.status();
-    const bool is_flat = std::count(numbers->begin(), numbers->end(), 0) > 0;
+    HULLD_ASSIGN_OR_RETURN(const auto numbers, NumbersOf(document_, mesh, "scale", 3));
+    const bool is_flat = std::count(numbers.begin(), numbers.end(), 0) > 0;
     if (is_flat) return document_.ErrorAt(mesh, "<mesh> scale must not be 0");
     // From the text, because a double would be rounded.
     std::string_view rest = mesh.attribute("scale").value();
@@ -233,9 +227,9 @@ class UrdfReader {
 
   absl::Status TakeSizes(pugi::xml_node shape, const char* attribute,
                          std::span<double> sizes) const {
-    const auto numbers = NumbersOf(document_, shape, attribute, sizes.size());
-    if (!numbers.ok()) return numbers.status();
-    std::copy(numbers->begin(), numbers->end(), sizes.begin());
+    HULLD_ASSIGN_OR_RETURN(const auto numbers,
+                           NumbersOf(document_, shape, attribute, sizes.size()));
+    std::copy(numbers.begin(), numbers.end(), sizes.begin());
     if (std::ranges::all_of(sizes, [](double size) { return size >= 0; })) return absl::OkStatus();
     return document_.ErrorAt(
         shape, absl::StrCat("<", shape.name(), "> ", attribute, " must not be negative"));
@@ -255,37 +249,33 @@ class UrdfReader {
   }
 
   absl::Status TakeJoint(pugi::xml_node element) {
-    const auto name = NameOf(element);
-    if (!name.ok()) return name.status();
-    const auto [entry, is_new] = joints_.try_emplace(*name);
+    HULLD_ASSIGN_OR_RETURN(const auto name, NameOf(element));
+    const auto [entry, is_new] = joints_.try_emplace(name);
     Joint& joint = entry->second;
     if (!is_new) return DefinedTwice(element, joint.element);
     joint.element = element;
-    joint.joint.name = *name;
+    joint.joint.name = name;
     const std::string type = element.attribute("type").value();
     const std::optional<JointKind> kind = KindOf(kJoints, type);
     if (!kind) {
       return document_.ErrorAt(
-          element, absl::StrCat("joint ", Quoted(*name), " has type ", Quoted(type),
+          element, absl::StrCat("joint ", Quoted(name), " has type ", Quoted(type),
                                 "; types are fixed, revolute, continuous, prismatic, planar and "
                                 "floating"));
     }
     joint.joint.kind = *kind;
-    absl::Status good =
-        CheckUnique(element, {"origin", "parent", "child", "axis", "limit", "mimic"});
-    if (good.ok()) good = TakeOrigin(element, &joint.joint.X_PJ);
-    if (good.ok()) good = TakeAxis(element, &joint.joint);
-    if (good.ok()) good = TakeLimits(element, &joint.joint);
-    if (!good.ok()) return good;
+    HULLD_RETURN_IF_ERROR(
+        CheckUnique(element, {"origin", "parent", "child", "axis", "limit", "mimic"}));
+    HULLD_RETURN_IF_ERROR(TakeOrigin(element, &joint.joint.X_PJ));
+    HULLD_RETURN_IF_ERROR(TakeAxis(element, &joint.joint));
+    HULLD_RETURN_IF_ERROR(TakeLimits(element, &joint.joint));
     for (const auto& [end, link] : {std::pair("parent", &joint.parent), {"child", &joint.child}}) {
-      auto found = LinkOf(element, end);
-      if (!found.ok()) return found.status();
-      *link = *std::move(found);
+      HULLD_ASSIGN_OR_RETURN(*link, LinkOf(element, end));
     }
     if (parent_of_.emplace(joint.child, joint.parent).second) return absl::OkStatus();
     return document_.ErrorAt(
         element, absl::StrCat("link ", Quoted(joint.child),
-                              " is the child of two joints; the second is ", Quoted(*name)));
+                              " is the child of two joints; the second is ", Quoted(name)));
   }
 
   absl::Status TakeAxis(pugi::xml_node element, RobotJoint* joint) const {
@@ -300,10 +290,9 @@ class UrdfReader {
                                                      " lacks <axis xyz=\"0 0 1\"/>, the normal of "
                                                      "its plane"));
     }
-    const auto xyz = NumbersOf(document_, axis, "xyz", 3);
-    if (!xyz.ok()) return xyz.status();
-    std::copy(xyz->begin(), xyz->end(), joint->axis.begin());
-    const double length = std::hypot((*xyz)[0], (*xyz)[1], (*xyz)[2]);
+    HULLD_ASSIGN_OR_RETURN(const auto xyz, NumbersOf(document_, axis, "xyz", 3));
+    std::copy(xyz.begin(), xyz.end(), joint->axis.begin());
+    const double length = std::hypot(xyz[0], xyz[1], xyz[2]);
     if (length == 0) return document_.ErrorAt(axis, "<axis> xyz must not be 0 0 0");
     // The travel of a prismatic joint is its value, regardless of the length of the axis.
     if (length != 1) {
@@ -324,17 +313,15 @@ class UrdfReader {
                                                      " lacks <limit lower=\"\" upper=\"\" ...>"));
     }
     std::array<double, 2>& range = joint->limits.emplace();
-    absl::Status good = TakeNumber(limit, "lower", &range[0]);
-    if (good.ok()) good = TakeNumber(limit, "upper", &range[1]);
-    return good;
+    HULLD_RETURN_IF_ERROR(TakeNumber(limit, "lower", &range[0]));
+    return TakeNumber(limit, "upper", &range[1]);
   }
 
   absl::Status TakeMimic(Joint* joint) const {
     const pugi::xml_node mimic = joint->element.child("mimic");
     if (!mimic) return absl::OkStatus();
-    absl::Status good = TakeNumber(mimic, "multiplier", &joint->joint.multiplier);
-    if (good.ok()) good = TakeNumber(mimic, "offset", &joint->joint.offset);
-    if (!good.ok()) return good;
+    HULLD_RETURN_IF_ERROR(TakeNumber(mimic, "multiplier", &joint->joint.multiplier));
+    HULLD_RETURN_IF_ERROR(TakeNumber(mimic, "offset", &joint->joint.offset));
     joint->leader = mimic.attribute("joint").value();
     const auto leader = joints_.find(joint->leader);
     if (leader == joints_.end()) {
@@ -438,15 +425,13 @@ class UrdfReader {
 }  // namespace
 
 absl::StatusOr<Robot> ParseUrdf(const std::string& text, const std::string& name) {
-  const auto document = ParseXml(text, name, "robot");
-  if (!document.ok()) return document.status();
-  return UrdfReader(**document).Run();
+  HULLD_ASSIGN_OR_RETURN(const auto document, ParseXml(text, name, "robot"));
+  return UrdfReader(*document).Run();
 }
 
 absl::StatusOr<Robot> ReadUrdf(const std::string& path) {
-  const auto text = ReadText(path);
-  if (!text.ok()) return text.status();
-  return ParseUrdf(*text, path == "-" ? "standard input" : path);
+  HULLD_ASSIGN_OR_RETURN(const auto text, ReadText(path));
+  return ParseUrdf(text, SourceName(path));
 }
 
 }  // namespace hulld

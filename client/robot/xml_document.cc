@@ -4,10 +4,8 @@
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
-#include <cmath>
 #include <set>
 #include <string_view>
-#include <utility>
 
 #include "client/formats/text_number.h"
 
@@ -211,15 +209,9 @@ absl::StatusOr<std::vector<double>> NumbersOf(const XmlDocument& document, pugi:
   std::vector<double> numbers;
   std::string_view rest = text;
   for (std::string_view token; !(token = NextToken(&rest)).empty();) {
-    double number = 0;
-    const NumberText kind = ParseDouble(token, &number);
-    if (kind != NumberText::kNumber) {
-      return error(absl::StrCat(attribute, ": ", NumberProblem(kind, token)));
-    }
-    if (!std::isfinite(number)) {
-      return error(absl::StrCat(attribute, ": ", Quoted(token), " is not a finite number"));
-    }
-    numbers.push_back(number);
+    const auto number = ParseFinite(token);
+    if (!number.ok()) return error(absl::StrCat(attribute, ": ", number.status().message()));
+    numbers.push_back(*number);
   }
   if (numbers.size() == count) return numbers;
   if (!element.attribute(attribute)) {

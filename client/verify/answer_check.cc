@@ -3,31 +3,31 @@
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
-#include <optional>
 #include <utility>
 
-#include "client/status_macros.h"
+#include "client/base/status_macros.h"
 #include "client/verify/certificate_check.h"
 #include "client/verify/motion_check.h"
-#include "client/verify/piece_check.h"
 
 namespace hulld {
 namespace {
 
 constexpr int kMeshReadAttempts = 5;
 
-constexpr char kOtherStore[] = "the server's store is not the one that the answer came from";
-
-// Returns true if a hull or a body is still at that version.
+// Returns the reason why a hull or a body, called `what`, is not the one of an answer; OK if it is.
 template <typename Info>
-bool IsSame(const Info& info, const v1::HullVersion& version) {
-  return info.create_revision() == version.create_revision() &&
-         info.revision() == version.revision();
-}
-
-std::string MovedText(const char* what, uint64_t revision, const v1::HullVersion& version) {
-  return absl::StrCat(what, " ", version.hull_id(), " is at revision ", revision,
-                      "; the answer is from revision ", version.revision());
+Verification Matched(const char* what, const v1::ResponseHeader& header, const Info& info,
+                     const v1::HullVersion& version) {
+  if (header.store_id() != version.store_id()) {
+    return {Verdict::kCannotCheck, "the server's store is not the one that the answer came from"};
+  }
+  if (info.create_revision() == version.create_revision() &&
+      info.revision() == version.revision()) {
+    return {};
+  }
+  return {Verdict::kMoved,
+          absl::StrCat(what, " ", version.hull_id(), " is at revision ", info.revision(),
+                       "; the answer is from revision ", version.revision())};
 }
 
 // Returns the reason that precludes a check; none for an answer that matches the query.
@@ -123,15 +123,8 @@ absl::StatusOr<const HullMesh*> AnswerChecker::Fetch(const v1::HullVersion& vers
     known = meshes_.insert_or_assign(id, *std::move(mesh)).first;
   }
   const v1::MeshHeader& header = known->second.header;
-  if (header.header().store_id() != version.store_id()) {
-    *problem = {Verdict::kCannotCheck, kOtherStore};
-    return nullptr;
-  }
-  if (!IsSame(header.hull(), version)) {
-    *problem = {Verdict::kMoved, MovedText("hull", header.hull().revision(), version)};
-    return nullptr;
-  }
-  return &known->second;
+  *problem = Matched("hull", header.header(), header.hull(), version);
+  return problem->reason.empty() ? &known->second : nullptr;
 }
 
 absl::StatusOr<std::optional<PlacedVertices>> AnswerChecker::FetchHull(
@@ -160,15 +153,8 @@ absl::StatusOr<const v1::GetBodyResponse*> AnswerChecker::FetchBody(const v1::Hu
     known = bodies_.insert_or_assign(id, *std::move(body)).first;
   }
   const v1::GetBodyResponse& body = known->second;
-  if (body.header().store_id() != version.store_id()) {
-    *problem = {Verdict::kCannotCheck, kOtherStore};
-    return nullptr;
-  }
-  if (!IsSame(body.body(), version)) {
-    *problem = {Verdict::kMoved, MovedText("body", body.body().revision(), version)};
-    return nullptr;
-  }
-  return &body;
+  *problem = Matched("body", body.header(), body.body(), version);
+  return problem->reason.empty() ? &body : nullptr;
 }
 
 absl::StatusOr<std::vector<PlacedVertices>> AnswerChecker::FetchPieces(

@@ -3,13 +3,8 @@
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
-#include <cmath>
-#include <string>
-#include <utility>
-#include <vector>
 
-#include "client/status_macros.h"
-#include "client/verify/exact_vector.h"
+#include "client/base/status_macros.h"
 
 namespace hulld {
 namespace {
@@ -82,12 +77,10 @@ absl::Status CheckPairs(const v1::Certificate& certificate, int max_pairs, const
   for (int i = 0; i < certificate.pairs_size(); ++i) {
     const v1::VertexPair& pair = certificate.pairs(i);
     const std::string name = absl::StrCat("pairs[", i, "].");
-    absl::Status s =
-        CheckVertex(pair.index_a(), pair.has_vertex_a(), pair.vertex_a(), a, name + "a");
-    if (s.ok()) {
-      s = CheckVertex(pair.index_b(), pair.has_vertex_b(), pair.vertex_b(), b, name + "b");
-    }
-    if (!s.ok()) return s;
+    HULLD_RETURN_IF_ERROR(
+        CheckVertex(pair.index_a(), pair.has_vertex_a(), pair.vertex_a(), a, name + "a"));
+    HULLD_RETURN_IF_ERROR(
+        CheckVertex(pair.index_b(), pair.has_vertex_b(), pair.vertex_b(), b, name + "b"));
   }
   return absl::OkStatus();
 }

@@ -3,12 +3,10 @@
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <string>
 
-#include "client/check.h"
-#include "client/status_macros.h"
+#include "client/base/check.h"
+#include "client/base/status_macros.h"
 
 namespace hulld {
 namespace {

@@ -4,7 +4,6 @@
 #include <absl/status/status.h>
 
 #include <array>
-#include <cstdint>
 #include <memory>
 #include <span>
 #include <utility>

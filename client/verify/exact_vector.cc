@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "client/check.h"
+#include "client/base/check.h"
 
 namespace hulld {
 namespace {

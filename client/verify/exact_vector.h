@@ -4,7 +4,6 @@
 #include <array>
 #include <boost/multiprecision/cpp_int.hpp>
 #include <span>
-#include <vector>
 
 namespace hulld {
 

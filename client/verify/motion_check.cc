@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "client/status_macros.h"
+#include "client/base/status_macros.h"
 #include "client/verify/certificate_check.h"
 
 namespace hulld {
@@ -309,9 +309,7 @@ absl::Status CheckTranslation(const MovingPair& pair, const BigVector& n,
 absl::Status CheckInterval(const MovingPair& pair, const v1::SeparatedInterval& interval,
                            double begin, bool may_end) {
   Plane start;
-  if (absl::Status s = ReadDirection(DirectionOf(interval), &start.n, &start.exponent); !s.ok()) {
-    return s;
-  }
+  HULLD_RETURN_IF_ERROR(ReadDirection(DirectionOf(interval), &start.n, &start.exponent));
   const bool has_end = interval.has_end_direction();
   if (has_end != interval.has_end_offset() || (has_end && !interval.has_offset())) {
     return ProofFails("the end of a plane needs a direction, and offsets at both ends");

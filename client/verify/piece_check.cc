@@ -2,7 +2,6 @@
 
 #include <absl/strings/str_cat.h>
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -15,8 +14,8 @@
 #include <utility>
 #include <vector>
 
-#include "client/check.h"
-#include "client/status_macros.h"
+#include "client/base/check.h"
+#include "client/base/status_macros.h"
 #include "client/verify/certificate_check.h"
 
 namespace hulld {

@@ -7,10 +7,9 @@
 #include <optional>
 #include <set>
 #include <string>
-#include <utility>
 #include <vector>
 
-#include "client/status_macros.h"
+#include "client/base/status_macros.h"
 #include "client/verify/exact_vector.h"
 #include "client/verify/triangle_tree.h"
 

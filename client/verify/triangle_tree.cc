@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "client/check.h"
+#include "client/base/check.h"
 #include "client/pose/vector3.h"
 
 namespace hulld {

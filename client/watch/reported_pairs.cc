@@ -92,14 +92,11 @@ bool ReportedPairs::TakeEvent(v1::CollisionEvent* event) {
 }
 
 void ReportedPairs::ReportEnded(v1::WatchCollisionsResponse* message) {
-  for (auto known = reported_.begin(); known != reported_.end();) {
-    if (reported_again_->contains(known->first)) {
-      ++known;
-      continue;
-    }
-    *message->add_events() = EndOf(known->first, known->second);
-    known = reported_.erase(known);
-  }
+  std::erase_if(reported_, [&](const auto& known) {
+    if (reported_again_->contains(known.first)) return false;
+    *message->add_events() = EndOf(known.first, known.second);
+    return true;
+  });
 }
 
 v1::CollisionEvent ReportedPairs::EndOf(const Pair& pair, const State& before) const {

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "client/base/status_macros.h"
 #include "client/formats/binary_scalar.h"
 #include "client/formats/point_file.h"
 #include "client/formats/text_number.h"
@@ -214,8 +215,7 @@ absl::Status ReadAscii(ByteSource* source, const Layout& layout, uint64_t count,
                                               " is one value too many; FIELDS and COUNT declare ",
                                               layout.row, " per point"));
     }
-    absl::Status status = points->AddScaled(xyz[0], xyz[1], xyz[2], error_at);
-    if (!status.ok()) return status;
+    HULLD_RETURN_IF_ERROR(points->AddScaled(xyz[0], xyz[1], xyz[2], error_at));
   }
   while (source->ReadLine(&line)) {
     if (Trim(line).empty()) continue;
@@ -257,8 +257,7 @@ absl::Status ReadBinary(ByteSource* source, const Layout& layout, uint64_t count
     }
     std::array<const unsigned char*, 3> coordinates;
     for (size_t axis = 0; axis < 3; ++axis) coordinates[axis] = row.data() + layout.position[axis];
-    absl::Status status = AddBinaryPoint(layout, coordinates, error_at, points);
-    if (!status.ok()) return status;
+    HULLD_RETURN_IF_ERROR(AddBinaryPoint(layout, coordinates, error_at, points));
   }
   return source->CheckEnd(Counted(count, "point"), layout.row);
 }
@@ -303,7 +302,7 @@ absl::Status Decompress(ByteSource* source, std::vector<unsigned char>* values) 
 absl::Status ReadCompressed(ByteSource* source, const PcdHeader& header, const Layout& layout,
                             uint64_t count, PointCollector* points) {
   std::vector<unsigned char> values;
-  if (absl::Status status = Decompress(source, &values); !status.ok()) return status;
+  HULLD_RETURN_IF_ERROR(Decompress(source, &values));
   const auto holds = [&](uint64_t row) {
     uint64_t size = 0;
     return !__builtin_mul_overflow(row, count, &size) && size == values.size();
@@ -324,8 +323,7 @@ absl::Status ReadCompressed(ByteSource* source, const PcdHeader& header, const L
     const auto error_at = [&](const std::string& message) {
       return absl::InvalidArgumentError(absl::StrCat(source->name(), ": ", message));
     };
-    absl::Status status = AddBinaryPoint(layout, coordinates, error_at, points);
-    if (!status.ok()) return status;
+    HULLD_RETURN_IF_ERROR(AddBinaryPoint(layout, coordinates, error_at, points));
     for (size_t axis = 0; axis < 3; ++axis) coordinates[axis] += SizeOf(layout.type[axis]);
   }
   return source->CheckEnd(Counted(count, "point"), layout.row);
@@ -335,7 +333,7 @@ absl::Status ReadCompressed(ByteSource* source, const PcdHeader& header, const L
 
 absl::Status ReadPcd(ByteSource* source, PointCollector* points) {
   PcdHeader header;
-  if (absl::Status status = ParsePcdHeader(source, &header); !status.ok()) return status;
+  HULLD_RETURN_IF_ERROR(ParsePcdHeader(source, &header));
   const bool ascii = header.data == "ascii";
   const bool compressed = header.data == "binary_compressed";
   if (!ascii && !compressed && header.data != "binary") {
@@ -345,10 +343,8 @@ absl::Status ReadPcd(ByteSource* source, PointCollector* points) {
   }
   Layout layout;
   uint64_t count = 0;
-  if (absl::Status status = MakeLayout(*source, header, !ascii, &layout); !status.ok()) {
-    return status;
-  }
-  if (absl::Status status = PointCount(*source, header, &count); !status.ok()) return status;
+  HULLD_RETURN_IF_ERROR(MakeLayout(*source, header, !ascii, &layout));
+  HULLD_RETURN_IF_ERROR(PointCount(*source, header, &count));
   return ascii        ? ReadAscii(source, layout, count, points)
          : compressed ? ReadCompressed(source, header, layout, count, points)
                       : ReadBinary(source, layout, count, points);

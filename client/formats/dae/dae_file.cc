@@ -1,7 +1,6 @@
 // Places the meshes of the nodes of a COLLADA document.
 #include <absl/strings/str_cat.h>
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <functional>
@@ -17,6 +16,7 @@
 #include "client/formats/mesh_file.h"
 #include "client/formats/point_file.h"
 #include "client/formats/text_number.h"
+#include "client/pose/vector3.h"
 
 namespace hulld {
 namespace {
@@ -30,12 +30,6 @@ constexpr size_t kMaxElements = size_t{1} << 20;
 constexpr size_t kMaxCorners = size_t{1} << 28;
 
 constexpr std::array<LengthScale, 3> kUnscaled = {};
-
-double Dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-
-Vector Cross(const Vector& a, const Vector& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
 
 // Exact at multiples of 90 degrees.
 double SineOfDegrees(double angle) {

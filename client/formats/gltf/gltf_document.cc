@@ -289,23 +289,15 @@ GltfDocument::View GltfDocument::ViewOf(const Struct& object, size_t count, size
 }
 
 std::optional<ScalarType> GltfDocument::TypeOf(const Struct& object, const std::string& what) {
-  switch (const size_t type = IntegerOf(object, "componentType").value_or(0)) {
-    case 5120:
-      return ScalarType::kInt8;
-    case 5121:
-      return ScalarType::kUint8;
-    case 5122:
-      return ScalarType::kInt16;
-    case 5123:
-      return ScalarType::kUint16;
-    case 5125:
-      return ScalarType::kUint32;
-    case 5126:
-      return ScalarType::kFloat;
-    default:
-      Fail(absl::StrCat(what, " has an unknown componentType ", type));
-      return std::nullopt;
+  static constexpr std::pair<size_t, ScalarType> kTypes[] = {
+      {5120, ScalarType::kInt8},   {5121, ScalarType::kUint8},  {5122, ScalarType::kInt16},
+      {5123, ScalarType::kUint16}, {5125, ScalarType::kUint32}, {5126, ScalarType::kFloat}};
+  const size_t type = IntegerOf(object, "componentType").value_or(0);
+  for (const auto& [number, scalar] : kTypes) {
+    if (number == type) return scalar;
   }
+  Fail(absl::StrCat(what, " has an unknown componentType ", type));
+  return std::nullopt;
 }
 
 std::vector<uint32_t> GltfDocument::Indices(const Struct& object, size_t count, size_t limit,

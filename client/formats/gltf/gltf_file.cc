@@ -38,7 +38,8 @@ using PrimitiveVisitor = std::function<absl::Status(const Primitive& primitive)>
 // Visits the primitives of the scene.
 class GltfWalk {
  public:
-  GltfWalk(ByteSource* source, const PrimitiveVisitor& visit) : document_(source), visit_(visit) {}
+  GltfWalk(ByteSource* source, PrimitiveVisitor visit)
+      : document_(source), visit_(std::move(visit)) {}
 
   absl::Status Run() {
     if (absl::Status s = document_.Load(); !s.ok()) return s;
@@ -360,7 +361,7 @@ class GltfWalk {
   }
 
   GltfDocument document_;
-  const PrimitiveVisitor& visit_;
+  const PrimitiveVisitor visit_;
   // Transforms of the scene's nodes.
   std::vector<std::optional<Affine>> X_WN_;
   size_t vertices_ = 0;
@@ -371,43 +372,38 @@ class GltfWalk {
 }  // namespace
 
 absl::Status ReadGltf(ByteSource* source, PointCollector* points) {
-  return GltfWalk(source,
-                  [&](const Primitive& primitive) {
-                    const auto& vertices = primitive.mesh.vertices;
-                    for (size_t i = 0; i < vertices.size(); ++i) {
-                      const auto error_at = [&](const std::string& message) {
-                        return absl::InvalidArgumentError(
-                            absl::StrCat(source->name(), ": vertex ", i, " of ",
-                                         Quoted(primitive.node), ": ", message));
-                      };
-                      const auto& [x, y, z] = vertices[i];
-                      absl::Status status =
-                          primitive.is_float
-                              ? points->AddFloat(static_cast<float>(x), static_cast<float>(y),
-                                                 static_cast<float>(z), error_at)
-                              : points->Add(x, y, z, error_at);
-                      if (!status.ok()) return status;
-                    }
-                    return absl::OkStatus();
-                  })
-      .Run();
+  const auto visit = [&](const Primitive& primitive) {
+    const auto& vertices = primitive.mesh.vertices;
+    for (size_t i = 0; i < vertices.size(); ++i) {
+      const auto error_at = [&](const std::string& message) {
+        return absl::InvalidArgumentError(absl::StrCat(source->name(), ": vertex ", i, " of ",
+                                                       Quoted(primitive.node), ": ", message));
+      };
+      const auto& [x, y, z] = vertices[i];
+      absl::Status status = primitive.is_float
+                                ? points->AddFloat(static_cast<float>(x), static_cast<float>(y),
+                                                   static_cast<float>(z), error_at)
+                                : points->Add(x, y, z, error_at);
+      if (!status.ok()) return status;
+    }
+    return absl::OkStatus();
+  };
+  return GltfWalk(source, visit).Run();
 }
 
 absl::Status ReadGltfParts(ByteSource* source, std::vector<MeshPart>* parts) {
   std::optional<size_t> last;
-  return GltfWalk(
-             source,
-             [&](const Primitive& primitive) {
-               for (const auto& [x, y, z] : primitive.mesh.vertices) {
-                 if (std::isfinite(x) && std::isfinite(y) && std::isfinite(z)) continue;
-                 return absl::InvalidArgumentError(absl::StrCat(
-                     source->name(), ": a vertex of ", Quoted(primitive.node), " is not finite"));
-               }
-               if (last != primitive.number) parts->push_back({primitive.node, {}});
-               last = primitive.number;
-               return AddMesh(source->name(), primitive.mesh, &parts->back().mesh);
-             })
-      .Run();
+  const auto visit = [&](const Primitive& primitive) {
+    for (const auto& [x, y, z] : primitive.mesh.vertices) {
+      if (std::isfinite(x) && std::isfinite(y) && std::isfinite(z)) continue;
+      return absl::InvalidArgumentError(
+          absl::StrCat(source->name(), ": a vertex of ", Quoted(primitive.node), " is not finite"));
+    }
+    if (last != primitive.number) parts->push_back({primitive.node, {}});
+    last = primitive.number;
+    return AddMesh(source->name(), primitive.mesh, &parts->back().mesh);
+  };
+  return GltfWalk(source, visit).Run();
 }
 
 }  // namespace hulld

@@ -1,14 +1,17 @@
-#include "client/hullctl/body/body_command.h"
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "client/formats/byte_source.h"
 #include "client/formats/text_number.h"
-#include "client/hullctl/body/body_pieces.h"
-#include "client/hullctl/command_line/freshness_options.h"
+#include "client/hullctl/command_line/arguments.h"
+#include "client/hullctl/command_line/commands.h"
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/printing/table.h"
 
@@ -25,6 +28,69 @@ struct BodyArguments {
   std::optional<uint64_t> if_revision;
 };
 
+// Parses "HULL[@POSE][:RADIUS]", with a pose as in ParsePose.
+absl::StatusOr<v1::Placement> ParsePiece(const std::string& text) {
+  const size_t colon = text.find(':');
+  const std::string placed = text.substr(0, colon);
+  const size_t at = placed.find('@');
+  v1::Placement piece;
+  piece.set_hull_id(placed.substr(0, at));
+  if (piece.hull_id().empty()) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        Quoted(text), " names no hull; a piece is HULL[@[w,x,y,z,]tx,ty,tz][:RADIUS]"));
+  }
+  if (colon != std::string::npos) {
+    double radius = 0;
+    if (ParseDouble(text.substr(colon + 1), &radius) != NumberText::kNumber ||
+        !std::isfinite(radius) || radius < 0) {
+      return absl::InvalidArgumentError(
+          absl::StrCat(Quoted(text), ": the radius after the colon is not a length of at least 0"));
+    }
+    piece.set_radius(radius);
+  }
+  if (at == std::string::npos) return piece;
+  const absl::StatusOr<v1::Pose> pose = ParsePose(placed.substr(at + 1));
+  if (!pose.ok()) {
+    return absl::InvalidArgumentError(absl::StrCat(Quoted(text), ": ", pose.status().message()));
+  }
+  *piece.mutable_pose() = *pose;
+  return piece;
+}
+
+// Adds the pieces of a JSON file, as written by 'hullctl body get --output json': {"pieces":[...]}.
+absl::Status ReadPieces(const std::string& path, v1::PutBodyRequest* request) {
+  HULLD_ASSIGN_OR_RETURN(const auto text, ReadText(path));
+  // Either the output of 'body get', or just its pieces.
+  v1::GetBodyResponse body;
+  if (absl::Status s = ParseJson(text, UnknownFields::kRefuse, &body); !s.ok()) {
+    return absl::InvalidArgumentError(absl::StrCat(SourceName(path), ": ", s.message()));
+  }
+  if (body.pieces().empty()) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        SourceName(path), ": contains no pieces; write {\"pieces\":[{\"hullId\":\"arm\"}]}"));
+  }
+  request->mutable_pieces()->MergeFrom(body.pieces());
+  return absl::OkStatus();
+}
+
+// Returns a pose in the form of ParsePose, with as few numbers as possible; empty for the
+// identity.
+std::string PoseText(const v1::Pose& pose) {
+  const v1::Quaternion& q = pose.rotation();
+  const v1::Vector3& t = pose.translation();
+  const bool turns = q.x() != 0 || q.y() != 0 || q.z() != 0;
+  const bool moves = t.x() != 0 || t.y() != 0 || t.z() != 0;
+  if (!turns && !moves) return "";
+  std::string text;
+  if (turns) {
+    for (const double number : {q.w(), q.x(), q.y(), q.z()}) {
+      absl::StrAppend(&text, ShortestText(number), ",");
+    }
+  }
+  return absl::StrCat(text, ShortestText(t.x()), ",", ShortestText(t.y()), ",",
+                      ShortestText(t.z()));
+}
+
 ExitCode PutBody(const Invocation& run, const BodyArguments& arguments) {
   v1::PutBodyRequest request;
   request.set_body_id(arguments.body_id);
@@ -34,46 +100,39 @@ ExitCode PutBody(const Invocation& run, const BodyArguments& arguments) {
         "pass the pieces as HULL[@POSE][:RADIUS] or with --pieces FILE, but not both");
   }
   for (const std::string& text : arguments.pieces) {
-    const absl::StatusOr<v1::Placement> piece = ParsePiece(text);
-    if (!piece.ok()) return run.FailUsage(piece.status());
-    *request.add_pieces() = *piece;
+    HULLD_ASSIGN_OR_FAIL(run.FailUsage, const v1::Placement piece, ParsePiece(text));
+    *request.add_pieces() = piece;
   }
   if (!arguments.file.empty()) {
-    const absl::Status read = ReadPieces(arguments.file, request.mutable_pieces());
+    const absl::Status read = ReadPieces(arguments.file, &request);
     if (!read.ok()) return run.FailUsage(read);
   }
-  const auto response = run.MakeClient().PutBody(request);
-  if (!response.ok()) return run.Fail(response.status());
-  if (!run.PrintForPrograms(*response, response->body().body_id())) {
-    run.out << response->body().body_id() << (response->created() ? " created" : " replaced")
-            << " at revision " << response->body().revision() << ", "
-            << Counted(response->body().piece_count(), "piece") << "\n";
+  HULLD_ASSIGN_OR_FAIL(run.Fail, const auto response, run.MakeClient().PutBody(request));
+  if (!run.PrintForPrograms(response, response.body().body_id())) {
+    run.out << response.body().body_id() << (response.created() ? " created" : " replaced")
+            << " at revision " << response.body().revision() << ", "
+            << Counted(response.body().piece_count(), "piece") << "\n";
   }
   return ExitCode::kDone;
 }
 
 ExitCode GetBody(const Invocation& run, const BodyArguments& arguments) {
-  const auto response = run.MakeClient().GetBody(arguments.body_id);
-  if (!response.ok()) return run.Fail(response.status());
-  if (run.json()) {
-    run.out << MessageJson(*response) << "\n";
-    return ExitCode::kDone;
-  }
-  if (run.names()) {
-    for (const v1::Placement& piece : response->pieces()) run.out << piece.hull_id() << "\n";
-    return ExitCode::kDone;
-  }
-  const v1::BodyInfo& body = response->body();
+  HULLD_ASSIGN_OR_FAIL(run.Fail, const auto response, run.MakeClient().GetBody(arguments.body_id));
+  const auto ids = absl::StrJoin(
+      response.pieces(), "\n",
+      [](std::string* out, const v1::Placement& piece) { out->append(piece.hull_id()); });
+  if (run.PrintForPrograms(response, ids)) return ExitCode::kDone;
+  const v1::BodyInfo& body = response.body();
   run.out << body.body_id() << " at revision " << body.revision() << ", created at "
           << body.create_revision() << "\n";
   Table table;
   const bool has_radii = std::ranges::any_of(
-      response->pieces(), [](const v1::Placement& piece) { return piece.radius() > 0; });
+      response.pieces(), [](const v1::Placement& piece) { return piece.radius() > 0; });
   std::vector<std::string> head = {"PIECE", "HULL", "POSE"};
   if (has_radii) head.push_back("RADIUS");
   table.Head(run.paint, head);
-  for (int i = 0; i < response->pieces_size(); ++i) {
-    const v1::Placement& piece = response->pieces(i);
+  for (int i = 0; i < response.pieces_size(); ++i) {
+    const v1::Placement& piece = response.pieces(i);
     const std::string pose = PoseText(piece.pose());
     std::vector<std::string> row = {std::to_string(i), piece.hull_id(), pose.empty() ? "-" : pose};
     if (has_radii) row.push_back(ShortestText(piece.radius()));
@@ -84,22 +143,22 @@ ExitCode GetBody(const Invocation& run, const BodyArguments& arguments) {
 }
 
 ExitCode ListBodies(const Invocation& run, const BodyArguments& arguments) {
-  const auto response = run.MakeClient().ListAllBodies(arguments.prefix, arguments.limit);
-  if (!response.ok()) return run.Fail(response.status());
+  HULLD_ASSIGN_OR_FAIL(run.Fail, const auto response,
+                       run.MakeClient().ListAllBodies(arguments.prefix, arguments.limit));
   if (run.json()) {
-    run.out << MessageJson(*response) << "\n";
+    run.out << MessageJson(response) << "\n";
   } else if (run.names()) {
-    for (const v1::BodyInfo& body : response->bodies()) run.out << body.body_id() << "\n";
+    for (const v1::BodyInfo& body : response.bodies()) run.out << body.body_id() << "\n";
   } else {
     Table table;
     table.Head(run.paint, {"BODY", "PIECES", "REVISION"});
-    for (const v1::BodyInfo& body : response->bodies()) {
+    for (const v1::BodyInfo& body : response.bodies()) {
       table.Row({body.body_id(), body.damaged() ? "damaged" : std::to_string(body.piece_count()),
                  std::to_string(body.revision())});
     }
     table.Print(run.out);
   }
-  if (!response->next_page_token().empty()) {
+  if (!response.next_page_token().empty()) {
     run.err << "hullctl: there are more bodies; raise --limit to list them\n";
   }
   return ExitCode::kDone;

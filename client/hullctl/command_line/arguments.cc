@@ -1,40 +1,34 @@
 #include "client/hullctl/command_line/arguments.h"
 
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_split.h>
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 #include <vector>
 
+#include "client/base/status_macros.h"
 #include "client/formats/text_number.h"
 #include "client/packed_placements.h"
 #include "client/pose/rigid_pose.h"
-#include "client/status_macros.h"
 
 namespace hulld {
 namespace {
 
-absl::StatusOr<std::vector<double>> ParseNumbers(std::string_view text) {
+absl::StatusOr<std::vector<double>> ParseNumbers(const std::string& text) {
   std::vector<double> numbers;
-  for (;;) {
-    const size_t comma = text.find(',');
-    const std::string_view part = Trim(text.substr(0, comma));
-    double number = 0;
-    const NumberText kind = ParseDouble(part, &number);
-    if (kind != NumberText::kNumber) {
-      std::string problem = NumberProblem(kind, part);
+  for (const std::string& cell : std::vector<std::string>(absl::StrSplit(text, ','))) {
+    const std::string_view part = Trim(cell);
+    const auto number = ParseFinite(part);
+    if (!number.ok()) {
       const bool has_blanks = part.find_first_of(" \t") != std::string_view::npos;
-      if (has_blanks) problem += "; separate numbers with commas, as in 1,0,0";
-      return absl::InvalidArgumentError(std::move(problem));
+      return absl::InvalidArgumentError(
+          absl::StrCat(number.status().message(),
+                       has_blanks ? "; separate numbers with commas, as in 1,0,0" : ""));
     }
-    if (!std::isfinite(number)) {
-      return absl::InvalidArgumentError(absl::StrCat(Quoted(part), " is not a finite number"));
-    }
-    numbers.push_back(number);
-    if (comma == std::string_view::npos) return numbers;
-    text.remove_prefix(comma + 1);
+    numbers.push_back(*number);
   }
+  return numbers;
 }
 
 }  // namespace
@@ -48,10 +42,7 @@ absl::StatusOr<std::chrono::milliseconds> ParseDuration(const std::string& text)
   constexpr double kDay = 24 * 3.6e6;
   for (const Unit& unit : kUnits) {
     std::string_view number = text;
-    if (number.size() < unit.name.size() ||
-        number.substr(number.size() - unit.name.size()) != unit.name) {
-      continue;
-    }
+    if (!number.ends_with(unit.name)) continue;
     number.remove_suffix(unit.name.size());
     double value = 0;
     if (ParseDouble(number, &value) != NumberText::kNumber) continue;

@@ -1,13 +1,11 @@
 #ifndef HULLD_CLIENT_HULLCTL_COMMAND_LINE_ARGUMENTS_H_
 #define HULLD_CLIENT_HULLCTL_COMMAND_LINE_ARGUMENTS_H_
 
-#include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
 #include <array>
 #include <chrono>
 #include <string>
-#include <string_view>
 
 #include "hulld/v1/collision.pb.h"
 #include "hulld/v1/geometry.pb.h"

@@ -6,11 +6,9 @@
 #include <absl/strings/str_split.h>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <system_error>
-#include <utility>
 
 #include "client/formats/text_number.h"
 #include "client/hullctl/help/help_text.h"

@@ -8,10 +8,9 @@
 #include <utility>
 #include <vector>
 
-#include "client/hullctl/command_line/arguments.h"
+#include "client/base/status_macros.h"
 #include "client/hullctl/context/context_file.h"
 #include "client/server_address.h"
-#include "client/status_macros.h"
 
 namespace hulld {
 namespace {

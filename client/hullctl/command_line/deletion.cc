@@ -1,23 +1,21 @@
 #include "client/hullctl/command_line/deletion.h"
 
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <iostream>
 
-#include "client/hullctl/printing/table.h"
+#include "client/formats/text_number.h"
 
 namespace hulld {
 namespace {
 
 std::string Naming(const std::vector<std::string>& ids) {
   constexpr size_t kNamed = 5;
-  std::string text;
-  for (size_t i = 0; i < ids.size() && i < kNamed; ++i) {
-    absl::StrAppend(&text, i > 0 ? ", " : "", ids[i]);
-  }
-  if (ids.size() > kNamed) absl::StrAppend(&text, ", ...");
-  return text;
+  const auto end = ids.begin() + static_cast<ptrdiff_t>(std::min(ids.size(), kNamed));
+  return absl::StrCat(absl::StrJoin(ids.begin(), end, ", "), ids.size() > kNamed ? ", ..." : "");
 }
 
 }  // namespace

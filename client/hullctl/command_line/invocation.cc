@@ -1,8 +1,15 @@
 #include "client/hullctl/command_line/invocation.h"
 
+#include <absl/strings/numbers.h>
 #include <absl/strings/str_cat.h>
 
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+
 #include "client/calls/grpc_status.h"
+#include "client/formats/text_number.h"
+#include "client/hullctl/command_line/arguments.h"
 #include "client/hullctl/command_line/tls_diagnosis.h"
 #include "client/hullctl/printing/json.h"
 
@@ -25,7 +32,7 @@ std::string ExplainConnectionFailure(const std::string& message, const std::stri
 
 std::string Explain(const absl::Status& status, const std::string& server,
                     std::chrono::milliseconds timeout, const ConnectionSecurity& security) {
-  const std::string message(status.message().data(), status.message().size());
+  const std::string message(status.message());
   // Errors without a reason come from gRPC itself.
   const v1::ErrorReason reason = ReasonOf(status);
   const bool is_hulld = reason != v1::ERROR_REASON_UNSPECIFIED;
@@ -75,6 +82,37 @@ std::string Explain(const absl::Status& status, const std::string& server,
   }
 }
 
+// Returns the freshness of the invocation for options to fill.
+v1::Freshness* FreshnessOf(Invocation* invocation) {
+  if (!invocation->freshness.has_value()) invocation->freshness.emplace();
+  return &*invocation->freshness;
+}
+
+absl::Status TakeBound(const std::string& text, v1::Freshness* freshness) {
+  const absl::StatusOr<std::chrono::milliseconds> bound = ParseDuration(text);
+  if (!bound.ok()) return bound.status();
+  freshness->mutable_max_staleness()->set_seconds(bound->count() / 1000);
+  freshness->mutable_max_staleness()->set_nanos(static_cast<int32_t>(bound->count() % 1000) *
+                                                1'000'000);
+  return absl::OkStatus();
+}
+
+absl::Status TakeRevision(const std::string& text, v1::Freshness* freshness) {
+  const size_t colon = text.rfind(':');
+  uint64_t revision = 0;
+  const bool is_read = colon != std::string::npos && colon > 0 &&
+                       absl::SimpleAtoi(text.substr(colon + 1), &revision);
+  if (!is_read) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(Quoted(text),
+                     " is not STORE:REVISION, the storeId and the revision of an answer's header "
+                     "(--output json)"));
+  }
+  freshness->set_store_id(text.substr(0, colon));
+  freshness->set_at_least_revision(revision);
+  return absl::OkStatus();
+}
+
 }  // namespace
 
 Client Invocation::MakeClient() const {
@@ -90,7 +128,11 @@ Client Invocation::MakeClient() const {
 
 bool Invocation::PrintForPrograms(const google::protobuf::Message& message,
                                   const std::string& name) const {
-  if (json()) out << MessageJson(message) << "\n";
+  return PrintForPrograms(json() ? MessageJson(message) : "", name);
+}
+
+bool Invocation::PrintForPrograms(const std::string& text, const std::string& name) const {
+  if (json()) out << text << "\n";
   if (names()) out << name << "\n";
   return json() || names();
 }
@@ -110,6 +152,22 @@ ExitCode Invocation::FailUsage(const std::string& message) const {
   return ExitCode::kUsage;
 }
 
+ExitCode Invocation::WriteFile(const std::string& path,
+                               const std::function<void(std::ostream&)>& write) const {
+  if (path.empty() || path == "-") {
+    write(out);
+    return ExitCode::kDone;
+  }
+  errno = 0;
+  std::ofstream file(path, std::ios::binary);
+  if (!file)
+    return FailUsage(absl::StrCat("cannot open ", path, " for writing: ", strerror(errno)));
+  write(file);
+  file.close();
+  if (file) return ExitCode::kDone;
+  return FailUsage(absl::StrCat("cannot write ", path, ": ", strerror(errno)));
+}
+
 ExitCode Invocation::Judge(const Verification& verification) const {
   switch (verification.verdict) {
     case Verdict::kValid:
@@ -123,6 +181,27 @@ ExitCode Invocation::Judge(const Verification& verification) const {
   }
   err << "hullctl: the certificate cannot be checked: " << verification.reason << "\n";
   return ExitCode::kCannotCheck;
+}
+
+void AddFreshnessOptions(Command command, Invocation* invocation) {
+  command
+      .AddParsed(
+          "--max-staleness",
+          [invocation](const std::string& text) {
+            return TakeBound(text, FreshnessOf(invocation));
+          },
+          "With several servers over one store: accept answers that are at most this old, such as "
+          "200ms (default: answers include every acknowledged change)")
+      .ValueName("TIME");
+  command
+      .AddParsed(
+          "--at-least",
+          [invocation](const std::string& text) {
+            return TakeRevision(text, FreshnessOf(invocation));
+          },
+          "Accept this revision of the store or a later one; it is in the header of an earlier "
+          "answer")
+      .ValueName("STORE:REVISION");
 }
 
 }  // namespace hulld

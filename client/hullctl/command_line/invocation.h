@@ -11,11 +11,10 @@
 #include <ostream>
 #include <string>
 #include <type_traits>
-#include <vector>
 
+#include "client/base/status_macros.h"
 #include "client/client.h"
 #include "client/hullctl/command_line/command.h"
-#include "client/hullctl/command_line/exit_code.h"
 #include "client/hullctl/context/connection_settings.h"
 #include "client/hullctl/help/command_description.h"
 #include "client/hullctl/printing/painter.h"
@@ -81,8 +80,9 @@ struct Invocation {
 
   Client MakeClient() const;
 
-  // With --output json or name, prints the message or the name. Returns false for other formats,
-  // which the command itself must print.
+  // With --output json or name, prints the text, which is JSON, or the name. Returns false for
+  // other formats, which the command itself must print.
+  bool PrintForPrograms(const std::string& text, const std::string& name) const;
   bool PrintForPrograms(const google::protobuf::Message& message, const std::string& name) const;
 
   // Reports a failed call with its remedy; returns the exit code for its status.
@@ -90,9 +90,25 @@ struct Invocation {
   // Reports errors of input and output files and arguments.
   ExitCode FailUsage(const absl::Status& status) const;
   ExitCode FailUsage(const std::string& message) const;
+  // Calls `write` with the file `path`, or with `out` if the path is empty or "-". Reports a file
+  // that cannot be opened or fully written.
+  ExitCode WriteFile(const std::string& path,
+                     const std::function<void(std::ostream&)>& write) const;
   // Reports why a certificate is not valid; returns the exit code for the verdict.
   ExitCode Judge(const Verification& verification) const;
 };
+
+// Returns the exit code of a failed expression of type absl::StatusOr, after `fail` (Fail or
+// FailUsage of an Invocation) reported its error; otherwise initializes `declaration`, or assigns
+// to it, with the value.
+#define HULLD_ASSIGN_OR_FAIL(fail, declaration, ...) \
+  HULLD_ASSIGN_OR_FAIL_VIA(HULLD_LINE_NAME(__LINE__), fail, declaration, (__VA_ARGS__))
+// NOLINTBEGIN(bugprone-macro-parentheses): parentheses around a declared name change its meaning.
+#define HULLD_ASSIGN_OR_FAIL_VIA(result, fail, declaration, expression) \
+  auto result = expression;                                             \
+  if (!result.ok()) return fail(result.status());                       \
+  declaration = *std::move(result)
+// NOLINTEND(bugprone-macro-parentheses)
 
 // Makes `action` the action of the invocation if the command is given.
 inline void OnGiven(Command command, Invocation* invocation, ExitCode (*action)(const Invocation&),
@@ -113,6 +129,10 @@ void OnGiven(Command command, Invocation* invocation, std::shared_ptr<Arguments>
     invocation->action = [=] { return action(*invocation, *arguments); };
   });
 }
+
+// Declares --max-staleness and --at-least for a read command. They set invocation->freshness, which
+// applies to all reads of the command.
+void AddFreshnessOptions(Command command, Invocation* invocation);
 
 }  // namespace hulld
 

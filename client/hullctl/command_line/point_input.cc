@@ -5,7 +5,7 @@
 
 #include <utility>
 
-#include "client/hullctl/printing/table.h"
+#include "client/formats/text_number.h"
 
 namespace hulld {
 

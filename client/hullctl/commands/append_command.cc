@@ -1,9 +1,11 @@
 #include <memory>
 #include <optional>
 
+#include "client/base/status_macros.h"
+#include "client/formats/text_number.h"
+#include "client/hullctl/command_line/commands.h"
 #include "client/hullctl/command_line/interrupt.h"
 #include "client/hullctl/command_line/point_input.h"
-#include "client/hullctl/commands/commands.h"
 #include "client/hullctl/parts/split_append.h"
 #include "client/hullctl/parts/volume_comparison.h"
 #include "client/hullctl/printing/json.h"
@@ -90,8 +92,8 @@ class FileAppender {
  private:
   absl::Status Take(const PointChunk& block) {
     if (appender_ == nullptr) {
-      if (absl::Status status = Create(); !status.ok()) return status;
-      if (absl::Status status = Open(); !status.ok()) return status;
+      HULLD_RETURN_IF_ERROR(Create());
+      HULLD_RETURN_IF_ERROR(Open());
       to_skip_ = arguments_.resume ? appender_->opened().last_sequence() : 0;
     }
     if (to_skip_ == 0) return appender_->Append(ToProto(block));
@@ -110,9 +112,7 @@ class FileAppender {
   absl::Status Open() {
     AppendOptions options;
     options.writer_id = arguments_.writer;
-    auto opened = client_.OpenAppend(arguments_.hull_id, options);
-    if (!opened.ok()) return opened.status();
-    appender_ = *std::move(opened);
+    HULLD_ASSIGN_OR_RETURN(appender_, client_.OpenAppend(arguments_.hull_id, options));
     return absl::OkStatus();
   }
 
@@ -235,12 +235,11 @@ ExitCode SplitAppend(const Invocation& run, const AppendArguments& arguments) {
 ExitCode AppendFiles(const Invocation& run, const AppendArguments& arguments) {
   if (arguments.split.has_value()) return SplitAppend(run, arguments);
   uint64_t total_bytes = 0;
-  auto plan = PlanReads(arguments.input, &total_bytes);
-  if (!plan.ok()) return run.FailUsage(plan.status());
+  HULLD_ASSIGN_OR_FAIL(run.FailUsage, auto plan, PlanReads(arguments.input, &total_bytes));
   const Interrupt interrupt;
   FileAppender files(run, arguments, total_bytes);
   FileAppender::Outcome outcome;
-  for (auto request = plan->begin(); request != plan->end() && outcome.ok(); ++request) {
+  for (auto request = plan.begin(); request != plan.end() && outcome.ok(); ++request) {
     outcome = files.Read(*request, interrupt);
   }
   // Points before a file's error were already sent: waits for them, so that the summary is correct.
@@ -252,7 +251,7 @@ ExitCode AppendFiles(const Invocation& run, const AppendArguments& arguments) {
   if (outcome.file.ok() || (sent && files.appender()->totals().points_acknowledged > 0)) {
     const bool whole = outcome.file.ok() && files.appender() != nullptr;
     const VolumeComparison volumes =
-        whole ? CompareVolumesOfFiles(run, arguments, *plan,
+        whole ? CompareVolumesOfFiles(run, arguments, plan,
                                       files.appender()->totals().points_acknowledged)
               : VolumeComparison{};
     PrintAppended(run, arguments.hull_id, files, volumes);

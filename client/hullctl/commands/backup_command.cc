@@ -2,7 +2,8 @@
 #include <string>
 
 #include "client/backup_file.h"
-#include "client/hullctl/commands/commands.h"
+#include "client/formats/text_number.h"
+#include "client/hullctl/command_line/commands.h"
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/printing/progress_bar.h"
 #include "client/hullctl/printing/table.h"
@@ -18,20 +19,12 @@ struct BackupArguments {
 void PrintBackup(const Invocation& run, const std::string& what, const BackupCheck& backup) {
   const v1::ResponseHeader& header = backup.begin().header();
   const v1::BackupEnd& totals = backup.totals();
-  if (run.names()) {
-    run.out << header.store_id() << "\n";
-    return;
-  }
-  if (run.json()) {
-    run.out << JsonObject()
-                   .Add("storeId", header.store_id())
-                   .Add("revision", header.revision())
-                   .Add("files", totals.file_count())
-                   .Add("bytes", totals.byte_count())
-                   .Close()
-            << "\n";
-    return;
-  }
+  JsonObject json;
+  json.Add("storeId", header.store_id())
+      .Add("revision", header.revision())
+      .Add("files", totals.file_count())
+      .Add("bytes", totals.byte_count());
+  if (run.PrintForPrograms(json.Close(), header.store_id())) return;
   Table table;
   table.Row({"backup", what})
       .Row({"store", header.store_id()})
@@ -64,9 +57,9 @@ ExitCode Save(const Invocation& run, const BackupArguments& arguments) {
 }
 
 ExitCode Restore(const Invocation& run, const BackupArguments& arguments) {
-  const auto restored = RestoreBackup(arguments.file, arguments.data_dir);
-  if (!restored.ok()) return run.FailUsage(restored.status());
-  PrintBackup(run, "restored to " + arguments.data_dir, *restored);
+  HULLD_ASSIGN_OR_FAIL(run.FailUsage, const auto restored,
+                       RestoreBackup(arguments.file, arguments.data_dir));
+  PrintBackup(run, "restored to " + arguments.data_dir, restored);
   return ExitCode::kDone;
 }
 

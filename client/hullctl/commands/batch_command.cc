@@ -1,19 +1,15 @@
-#include <absl/strings/str_cat.h>
 
 #include <deque>
 #include <memory>
 #include <optional>
 #include <unordered_map>
 
-#include "client/hullctl/command_line/freshness_options.h"
-#include "client/hullctl/command_line/query_options.h"
-#include "client/hullctl/commands/commands.h"
+#include "client/hullctl/command_line/commands.h"
+#include "client/hullctl/commands/scene_answers.h"
 #include "client/hullctl/pairs/batch_answers.h"
-#include "client/hullctl/printing/answer_row.h"
 #include "client/hullctl/printing/answer_text.h"
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/printing/progress_bar.h"
-#include "client/hullctl/scene/scene_file.h"
 #include "client/verify/answer_check.h"
 #include "client/verify/motion_check.h"
 
@@ -210,32 +206,20 @@ class BatchRun {
              const std::optional<Verification>& verification) {
     ++counts_[row.relation];
     const bool as_expected = !verification || verification->verdict == Verdict::kValid;
-    const std::string names =
-        absl::StrCat(scene_.NameOf(pairs_[2 * pair]), "\t", scene_.NameOf(pairs_[2 * pair + 1]));
+    const uint32_t a = pairs_[2 * pair];
+    const uint32_t b = pairs_[2 * pair + 1];
     if (run_.json()) {
       // The contract has no field for the verification.
       if (!as_expected) {
-        run_.err << "hullctl: " << names << "\t" << VerificationText(*verification, Painter())
-                 << "\n";
+        run_.err << "hullctl: " << scene_.NameOf(a) << "\t" << scene_.NameOf(b) << "\t"
+                 << VerificationText(*verification, Painter()) << "\n";
       }
       return;
     }
     if (arguments_.colliding && row.relation == v1::RELATION_SEPARATED && as_expected) return;
     bar_.Clear();
-    run_.out << names << "\t";
-    if (problem != nullptr) {
-      run_.out << run_.paint(Hue::kBad, "FAILED") << (run_.names() ? "" : "\t" + *problem) << "\n";
-      return;
-    }
-    if (run_.names()) {
-      run_.out << RelationText(row.relation) << "\n";
-      return;
-    }
-    run_.out << RowText(row, run_.paint,
-                        scene_.NamesOfPieces(pairs_[2 * pair], pairs_[2 * pair + 1],
-                                             row.pieces.value_or(std::pair(-1, -1))));
-    if (verification) run_.out << "\t" << VerificationText(*verification, run_.paint);
-    run_.out << "\n";
+    PrintPair(run_, scene_, a, b, row, problem,
+              verification ? "\t" + VerificationText(*verification, run_.paint) : "");
   }
 
   void PrintTotals() {
@@ -286,12 +270,25 @@ class BatchRun {
 };
 
 ExitCode Batch(const Invocation& run, const BatchArguments& arguments) {
-  const auto scene = ReadWholeScene(arguments.file, "batch", FormFor(arguments.details));
-  if (!scene.ok()) return run.FailUsage(scene.status());
-  return AnswerPairs(run, arguments.file, *scene, arguments.details, arguments.colliding);
+  HULLD_ASSIGN_OR_FAIL(run.FailUsage, const auto scene,
+                       ReadWholeScene(arguments.file, "batch", FormFor(arguments.details)));
+  return AnswerPairs(run, arguments.file, scene, arguments.details, arguments.colliding);
 }
 
 }  // namespace
+
+void PrintPair(const Invocation& run, const Scene& scene, uint32_t a, uint32_t b,
+               const AnswerRow& row, const std::string* problem, const std::string& suffix) {
+  run.out << scene.NameOf(a) << "\t" << scene.NameOf(b) << "\t";
+  if (problem != nullptr) {
+    run.out << run.paint(Hue::kBad, "FAILED") << (run.names() ? "" : "\t" + *problem) << "\n";
+  } else if (run.names()) {
+    run.out << RelationText(row.relation) << "\n";
+  } else {
+    const auto pieces = scene.NamesOfPieces(a, b, row.pieces.value_or(std::pair(-1, -1)));
+    run.out << RowText(row, run.paint, pieces) << suffix << "\n";
+  }
+}
 
 BodyForm FormFor(const QueryDetails& details) {
   return details.method == v1::METHOD_TEXTBOOK_SAT ? BodyForm::kPieces : BodyForm::kWhole;
@@ -305,13 +302,12 @@ ExitCode AnswerPairs(const Invocation& run, const std::string& file, const Scene
         "--colliding cannot be combined with --output json, which prints every pair; use 'hullctl "
         "scene' to find colliding pairs");
   }
-  const auto pairs = PairsOf(scene, file);
-  if (!pairs.ok()) return run.FailUsage(pairs.status());
-  BatchRun batch(run, arguments, scene, *pairs);
+  HULLD_ASSIGN_OR_FAIL(run.FailUsage, const auto pairs, PairsOf(scene, file));
+  BatchRun batch(run, arguments, scene, pairs);
   if (absl::Status status = batch.Run(); !status.ok()) return run.Fail(scene.InKeys(status));
   const auto report = [&](uint64_t count, const char* what) {
     if (count == 0) return false;
-    run.err << "hullctl: " << count << " of " << pairs->size() / 2 << " pairs " << what << "\n";
+    run.err << "hullctl: " << count << " of " << pairs.size() / 2 << " pairs " << what << "\n";
     return true;
   };
   const bool failed = report(batch.failed(), "failed; each line gives the reason");

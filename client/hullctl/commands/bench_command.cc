@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cmath>
 #include <memory>
 #include <random>
 #include <utility>
@@ -12,9 +11,8 @@
 
 #include "client/formats/text_number.h"
 #include "client/hullctl/command_line/arguments.h"
-#include "client/hullctl/command_line/freshness_options.h"
+#include "client/hullctl/command_line/commands.h"
 #include "client/hullctl/command_line/interrupt.h"
-#include "client/hullctl/commands/commands.h"
 #include "client/hullctl/load/load.h"
 #include "client/hullctl/load/load_subjects.h"
 #include "client/hullctl/printing/json.h"
@@ -41,16 +39,9 @@ constexpr NamedMode kModes[] = {{"check", LoadMode::kCheck},
 
 // Returns the name of an item of a request.
 const char* ItemName(LoadMode mode) {
-  switch (mode) {
-    case LoadMode::kCheck:
-    case LoadMode::kBatch:
-      return "pairs";
-    case LoadMode::kAppend:
-      return "points";
-    case LoadMode::kMixed:
-      break;
-  }
-  return "pairs and points";
+  return mode == LoadMode::kAppend  ? "points"
+         : mode == LoadMode::kMixed ? "pairs and points"
+                                    : "pairs";
 }
 
 std::string RandomName() {

@@ -14,8 +14,7 @@
 
 #include "client/formats/text_number.h"
 #include "client/hullctl/command_line/arguments.h"
-#include "client/hullctl/command_line/freshness_options.h"
-#include "client/hullctl/commands/commands.h"
+#include "client/hullctl/command_line/commands.h"
 #include "client/hullctl/printing/answer_row.h"
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/printing/table.h"
@@ -197,13 +196,11 @@ ExitCode CastRay(const Invocation& run, const CastArguments& arguments) {
     return run.FailUsage("ORIGIN + DIRECTION exceeds the largest double; shorten the ray");
   }
   const Client client = run.MakeClient();
-  const auto list = client.ListAllHulls(arguments.prefix);
-  if (!list.ok()) return run.Fail(list.status());
-  const auto found = Cast(client, ray, *list);
-  if (!found.ok()) return run.Fail(found.status());
-  Print(run, *found);
-  if (found->failed == 0) return ExitCode::kDone;
-  run.err << "hullctl: " << found->failed << " of " << Counted(list->hulls_size(), "hull")
+  HULLD_ASSIGN_OR_FAIL(run.Fail, const auto list, client.ListAllHulls(arguments.prefix));
+  HULLD_ASSIGN_OR_FAIL(run.Fail, const auto found, Cast(client, ray, list));
+  Print(run, found);
+  if (found.failed == 0) return ExitCode::kDone;
+  run.err << "hullctl: " << found.failed << " of " << Counted(list.hulls_size(), "hull")
           << " have no answer; they were deleted during the command; run it again\n";
   return ExitCode::kSomeFailed;
 }

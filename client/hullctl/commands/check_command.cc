@@ -13,10 +13,8 @@
 #include "client/formats/point_file.h"
 #include "client/formats/text_number.h"
 #include "client/hullctl/command_line/arguments.h"
-#include "client/hullctl/command_line/freshness_options.h"
-#include "client/hullctl/command_line/output_file.h"
+#include "client/hullctl/command_line/commands.h"
 #include "client/hullctl/command_line/query_options.h"
-#include "client/hullctl/commands/commands.h"
 #include "client/hullctl/local/file_shape.h"
 #include "client/hullctl/pairs/point_check.h"
 #include "client/hullctl/printing/answer_text.h"
@@ -210,8 +208,7 @@ using Given = std::pair<bool, const char*>;
 
 // Returns the name of the first one that is given, or null.
 const char* FirstGiven(std::initializer_list<Given> options) {
-  const auto found = std::find_if(options.begin(), options.end(),
-                                  [](const Given& option) { return option.first; });
+  const auto found = std::ranges::find(options, true, &Given::first);
   return found == options.end() ? nullptr : found->second;
 }
 
@@ -345,10 +342,10 @@ ExitCode CheckPair(const Invocation& run, const PairArguments& arguments) {
   // A record on standard output replaces the answer.
   if (arguments.record != "-") PrintAnswer(run, arguments, request, answer.response, verification);
   if (!arguments.record.empty()) {
-    const absl::Status written = WriteOutput(arguments.record, run.out, [&](std::ostream& out) {
+    const ExitCode written = run.WriteFile(arguments.record, [&](std::ostream& out) {
       out << RecordJson(request, answer.response) << "\n";
     });
-    if (!written.ok()) return run.FailUsage(written);
+    if (written != ExitCode::kDone) return written;
   }
   return verification == nullptr ? ExitCode::kDone : run.Judge(*verification);
 }

@@ -2,13 +2,11 @@
 #include <absl/strings/str_cat.h>
 
 #include <filesystem>
-#include <fstream>
 #include <memory>
 #include <string>
 
-#include "client/hullctl/command_line/output_file.h"
-#include "client/hullctl/commands/commands.h"
-#include "client/hullctl/completion/completion_script.h"
+#include "client/hullctl/command_line/commands.h"
+#include "client/hullctl/completion/completion.h"
 #include "client/hullctl/help/man_page.h"
 
 namespace hulld {
@@ -42,15 +40,15 @@ ExitCode WriteManPages(const Invocation& run, const std::string& folder) {
   const CommandDescription& program = *run.program;
   const auto write = [&](const CommandDescription& command,
                          const std::vector<ManSection>& sections) {
-    return WriteOutput(
-        absl::StrCat(folder, "/", ManPageName(command)), run.out,
-        [&](std::ostream& out) { out << ManPage(program, command, HULLD_VERSION, sections); });
+    return run.WriteFile(absl::StrCat(folder, "/", ManPageName(command)), [&](std::ostream& out) {
+      out << ManPage(program, command, HULLD_VERSION, sections);
+    });
   };
-  absl::Status written = write(program, ProgramSections());
+  ExitCode written = write(program, ProgramSections());
   for (const auto& command : program.commands) {
-    if (written.ok() && !command->hidden) written = write(*command, {});
+    if (written == ExitCode::kDone && !command->hidden) written = write(*command, {});
   }
-  return written.ok() ? ExitCode::kDone : run.FailUsage(written);
+  return written;
 }
 
 }  // namespace

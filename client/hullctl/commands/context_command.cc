@@ -5,8 +5,8 @@
 #include <string>
 
 #include "client/formats/text_number.h"
+#include "client/hullctl/command_line/commands.h"
 #include "client/hullctl/command_line/connection.h"
-#include "client/hullctl/commands/commands.h"
 #include "client/hullctl/context/context_file.h"
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/printing/table.h"
@@ -53,27 +53,23 @@ ExitCode Add(const Invocation& run, const ContextArguments& arguments) {
   }
   if (!run.flags.contains("server"))
     return run.FailUsage("a context needs a server; pass --server HOST:PORT");
-  auto file = ReadContextFile();
-  if (!file.ok()) return run.FailUsage(file.status());
-  if (file->contexts.contains(arguments.name) && !arguments.replace) {
+  HULLD_ASSIGN_OR_FAIL(run.FailUsage, auto file, ReadContextFile());
+  if (file.contexts.contains(arguments.name) && !arguments.replace) {
     return run.FailUsage(
         absl::StrCat("context ", arguments.name, " already exists; pass --replace to replace it"));
   }
   const ConnectionSettings settings = WithAbsolutePaths(run.flags);
   // Detects a missing file, or a token readable by other users, before saving.
-  const auto security = ReadSecurity(Combine({{"", settings, false}}));
-  if (!security.ok()) return run.FailUsage(security.status());
-  const absl::Status valid = ValidateSecurity(*security, settings.at("server"));
+  HULLD_ASSIGN_OR_FAIL(run.FailUsage, const auto security,
+                       ReadSecurity(Combine({{"", settings, false}})));
+  const absl::Status valid = ValidateSecurity(security, settings.at("server"));
   if (!valid.ok()) return run.FailUsage(valid);
-  file->contexts[arguments.name] = settings;
-  const bool first = file->current.empty();
-  if (first) file->current = arguments.name;
-  if (absl::Status s = WriteContextFile(*file); !s.ok()) return run.FailUsage(s);
-  if (run.json()) {
-    run.out << ContextJson(arguments.name, settings, file->current == arguments.name) << "\n";
-  } else if (run.names()) {
-    run.out << arguments.name << "\n";
-  } else {
+  file.contexts[arguments.name] = settings;
+  const bool first = file.current.empty();
+  if (first) file.current = arguments.name;
+  if (absl::Status s = WriteContextFile(file); !s.ok()) return run.FailUsage(s);
+  const bool current = file.current == arguments.name;
+  if (!run.PrintForPrograms(ContextJson(arguments.name, settings, current), arguments.name)) {
     run.out << "context " << arguments.name << " added" << (first ? " and selected" : "") << "\n";
   }
   return ExitCode::kDone;
@@ -83,35 +79,29 @@ ExitCode Use(const Invocation& run, const ContextArguments& arguments) {
   if (arguments.none == !arguments.name.empty()) {
     return run.FailUsage("pass the name of a context, or --none");
   }
-  auto file = ReadContextFile();
-  if (!file.ok()) return run.FailUsage(file.status());
+  HULLD_ASSIGN_OR_FAIL(run.FailUsage, auto file, ReadContextFile());
   if (!arguments.none) {
-    const auto found = FindContext(*file, arguments.name);
+    const auto found = FindContext(file, arguments.name);
     if (!found.ok()) return run.FailUsage(found.status());
   }
-  file->current = arguments.name;
-  if (absl::Status s = WriteContextFile(*file); !s.ok()) return run.FailUsage(s);
+  file.current = arguments.name;
+  if (absl::Status s = WriteContextFile(file); !s.ok()) return run.FailUsage(s);
   if (arguments.none) {
     run.out << "no context is selected\n";
   } else {
     run.out << "context " << arguments.name
-            << " selected: " << file->contexts.at(arguments.name).at("server") << "\n";
+            << " selected: " << file.contexts.at(arguments.name).at("server") << "\n";
   }
   return ExitCode::kDone;
 }
 
 ExitCode ListContexts(const Invocation& run) {
-  const auto file = ReadContextFile();
-  if (!file.ok()) return run.FailUsage(file.status());
+  HULLD_ASSIGN_OR_FAIL(run.FailUsage, const auto file, ReadContextFile());
   Table table;
   table.Head(run.paint, {"CONTEXT", "SERVER", "TLS", "TOKEN FILE", "USED"});
-  for (const auto& [name, settings] : file->contexts) {
-    const bool current = name == file->current;
-    if (run.json()) {
-      run.out << ContextJson(name, settings, current) << "\n";
-    } else if (run.names()) {
-      run.out << name << "\n";
-    }
+  for (const auto& [name, settings] : file.contexts) {
+    const bool current = name == file.current;
+    run.PrintForPrograms(ContextJson(name, settings, current), name);
     const auto security = settings.contains("tls") || settings.contains("ca-cert") ||
                           settings.contains("cert") || settings.contains("server-name");
     const auto token = settings.find("token-file");
@@ -120,22 +110,21 @@ ExitCode ListContexts(const Invocation& run) {
   }
   if (run.json() || run.names()) return ExitCode::kDone;
   table.Print(run.out);
-  if (file->contexts.empty()) {
+  if (file.contexts.empty()) {
     run.err << "hullctl: no contexts; add one with 'hullctl context add'\n";
   }
   return ExitCode::kDone;
 }
 
 ExitCode Remove(const Invocation& run, const ContextArguments& arguments) {
-  auto file = ReadContextFile();
-  if (!file.ok()) return run.FailUsage(file.status());
-  if (const auto found = FindContext(*file, arguments.name); !found.ok()) {
+  HULLD_ASSIGN_OR_FAIL(run.FailUsage, auto file, ReadContextFile());
+  if (const auto found = FindContext(file, arguments.name); !found.ok()) {
     return run.FailUsage(found.status());
   }
-  file->contexts.erase(arguments.name);
-  const bool was_used = file->current == arguments.name;
-  if (was_used) file->current.clear();
-  if (absl::Status s = WriteContextFile(*file); !s.ok()) return run.FailUsage(s);
+  file.contexts.erase(arguments.name);
+  const bool was_used = file.current == arguments.name;
+  if (was_used) file.current.clear();
+  if (absl::Status s = WriteContextFile(file); !s.ok()) return run.FailUsage(s);
   run.out << "context " << arguments.name << " removed"
           << (was_used ? "; no context is selected" : "") << "\n";
   return ExitCode::kDone;
@@ -159,11 +148,7 @@ ExitCode Show(const Invocation& invocation, const ContextArguments& arguments) {
   if (const auto token = run.connection.find(kTokenSetting); token != run.connection.end()) {
     table.Row({kTokenSetting, "set", absl::StrCat("($", kTokenVariable, ")")});
   }
-  if (run.json()) {
-    run.out << object.Close() << "\n";
-  } else if (run.names()) {
-    run.out << run.connection.at("server").value << "\n";
-  } else {
+  if (!run.PrintForPrograms(object.Close(), run.connection.at("server").value)) {
     table.Print(run.out);
   }
   return resolved.ok() ? ExitCode::kDone : run.FailUsage(resolved);

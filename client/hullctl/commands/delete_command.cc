@@ -5,9 +5,8 @@
 #include <vector>
 
 #include "client/formats/text_number.h"
+#include "client/hullctl/command_line/commands.h"
 #include "client/hullctl/command_line/deletion.h"
-#include "client/hullctl/commands/commands.h"
-#include "client/hullctl/printing/json.h"
 #include "client/hullctl/printing/progress_bar.h"
 
 namespace hulld {
@@ -103,16 +102,14 @@ ExitCode DeleteHulls(const Invocation& run, const DeleteArguments& arguments) {
     return run.FailUsage("refusing to delete all hulls on the server: --prefix is empty");
   }
   const Client client = run.MakeClient();
-  const auto targets = Choose(client, arguments);
-  if (!targets.ok()) return run.Fail(targets.status());
-  if (targets->empty()) {
+  HULLD_ASSIGN_OR_FAIL(run.Fail, const auto targets, Choose(client, arguments));
+  if (targets.empty()) {
     run.err << "hullctl: no hull ID starts with " << Quoted(arguments.prefix) << "\n";
     return ExitCode::kDone;
   }
-  const auto confirmed = IsConfirmed(run, arguments, *targets);
-  if (!confirmed.ok()) return run.FailUsage(confirmed.status());
-  if (!*confirmed) return run.FailUsage("cancelled; nothing was deleted");
-  return DeleteAll(run, client, arguments, *targets);
+  HULLD_ASSIGN_OR_FAIL(run.FailUsage, const auto confirmed, IsConfirmed(run, arguments, targets));
+  if (!confirmed) return run.FailUsage("cancelled; nothing was deleted");
+  return DeleteAll(run, client, arguments, targets);
 }
 
 }  // namespace

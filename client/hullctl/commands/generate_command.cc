@@ -1,12 +1,10 @@
-#include <absl/strings/str_cat.h>
 
 #include <cmath>
 #include <memory>
 
 #include "client/formats/text_number.h"
 #include "client/hullctl/command_line/arguments.h"
-#include "client/hullctl/command_line/output_file.h"
-#include "client/hullctl/commands/commands.h"
+#include "client/hullctl/command_line/commands.h"
 #include "client/hullctl/load/point_generator.h"
 #include "client/hullctl/printing/progress_bar.h"
 
@@ -40,14 +38,14 @@ ExitCode Generate(const Invocation& run, const GenerateArguments& arguments) {
   const bool to_file = !arguments.file.empty() && arguments.file != "-";
   ProgressBar bar(run.err, run.shows_progress && to_file, "points", cloud.count);
   uint64_t done = 0;
-  const absl::Status written = WriteOutput(arguments.file, run.out, [&](std::ostream& out) {
+  const ExitCode written = run.WriteFile(arguments.file, [&](std::ostream& out) {
     GenerateCloud(cloud, [&](const std::array<double, 3>& p) {
       if (++done % 4096 == 0) bar.Update(done);
       out << ShortestText(p[0]) << ' ' << ShortestText(p[1]) << ' ' << ShortestText(p[2]) << '\n';
     });
   });
   bar.Clear();
-  return written.ok() ? ExitCode::kDone : run.FailUsage(written);
+  return written;
 }
 
 }  // namespace

@@ -5,10 +5,8 @@
 #include <string>
 
 #include "client/formats/text_number.h"
-#include "client/hullctl/command_line/freshness_options.h"
-#include "client/hullctl/commands/commands.h"
+#include "client/hullctl/command_line/commands.h"
 #include "client/hullctl/printing/answer_text.h"
-#include "client/hullctl/printing/json.h"
 #include "client/hullctl/printing/table.h"
 
 namespace hulld {
@@ -26,11 +24,11 @@ struct CreateOptions {
 };
 
 ExitCode Create(const Invocation& run, const CreateOptions& options) {
-  const auto response = run.MakeClient().CreateHull(options.hull_id, options.if_absent);
-  if (!response.ok()) return run.Fail(response.status());
-  if (!run.PrintForPrograms(*response, options.hull_id)) {
-    run.out << options.hull_id << (response->created() ? " created" : " already exists")
-            << " at revision " << response->hull().create_revision() << "\n";
+  HULLD_ASSIGN_OR_FAIL(run.Fail, const auto response,
+                       run.MakeClient().CreateHull(options.hull_id, options.if_absent));
+  if (!run.PrintForPrograms(response, options.hull_id)) {
+    run.out << options.hull_id << (response.created() ? " created" : " already exists")
+            << " at revision " << response.hull().create_revision() << "\n";
   }
   return ExitCode::kDone;
 }
@@ -87,13 +85,12 @@ void PrintHull(const Invocation& run, const v1::GetHullResponse& response) {
 
 ExitCode GetHull(const Invocation& run, const v1::GetHullRequest& request) {
   const std::string& hull_id = request.hull_id();
-  const auto response = run.MakeClient().GetHull(request);
-  if (!response.ok()) return run.Fail(response.status());
-  if (!run.PrintForPrograms(*response, hull_id)) {
-    PrintHull(run, *response);
+  HULLD_ASSIGN_OR_FAIL(run.Fail, const auto response, run.MakeClient().GetHull(request));
+  if (!run.PrintForPrograms(response, hull_id)) {
+    PrintHull(run, response);
   }
-  if (request.audit() && !response->audit().ok()) {
-    run.err << "hullctl: the audit of " << hull_id << " found: " << response->audit().finding()
+  if (request.audit() && !response.audit().ok()) {
+    run.err << "hullctl: the audit of " << hull_id << " found: " << response.audit().finding()
             << "; please report it with the points\n";
     return ExitCode::kRequestFailed;
   }

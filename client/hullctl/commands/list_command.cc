@@ -3,8 +3,7 @@
 #include <map>
 #include <memory>
 
-#include "client/hullctl/command_line/freshness_options.h"
-#include "client/hullctl/commands/commands.h"
+#include "client/hullctl/command_line/commands.h"
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/printing/table.h"
 
@@ -53,24 +52,15 @@ void PrintCount(const Invocation& run, const v1::ListHullsResponse& response, ui
     points += hull.counts().received();
   }
   const auto hulls = static_cast<uint64_t>(response.hulls_size());
-  if (run.json()) {
-    run.out << JsonObject()
-                   .Add("hulls", hulls)
-                   .Add("vertices", vertices)
-                   .Add("points", points)
-                   .Add("bodies", bodies)
-                   .Close()
-            << "\n";
-  } else if (run.names()) {
-    run.out << hulls << "\n";
-  } else {
-    Table table;
-    table.Row({"hulls", std::to_string(hulls)})
-        .Row({"vertices", std::to_string(vertices)})
-        .Row({"points", std::to_string(points)});
-    if (bodies > 0) table.Row({"bodies", std::to_string(bodies)});
-    table.Print(run.out);
-  }
+  JsonObject json;
+  json.Add("hulls", hulls).Add("vertices", vertices).Add("points", points).Add("bodies", bodies);
+  if (run.PrintForPrograms(json.Close(), std::to_string(hulls))) return;
+  Table table;
+  table.Row({"hulls", std::to_string(hulls)})
+      .Row({"vertices", std::to_string(vertices)})
+      .Row({"points", std::to_string(points)});
+  if (bodies > 0) table.Row({"bodies", std::to_string(bodies)});
+  table.Print(run.out);
 }
 
 void PrintHullTable(const Invocation& run, const v1::ListHullsResponse& response) {
@@ -97,32 +87,33 @@ void PrintHullTable(const Invocation& run, const v1::ListHullsResponse& response
 ExitCode ListHulls(const Invocation& run, const ListArguments& arguments) {
   // Sorting needs the complete list before the limit applies.
   const bool sorts = arguments.reverse || !arguments.sort.empty();
-  auto response = run.MakeClient().ListAllHulls(arguments.prefix, sorts ? 0 : arguments.limit);
-  if (!response.ok()) return run.Fail(response.status());
-  Sort(arguments, &*response);
-  bool cut = !response->next_page_token().empty();
+  HULLD_ASSIGN_OR_FAIL(
+      run.Fail, auto response,
+      run.MakeClient().ListAllHulls(arguments.prefix, sorts ? 0 : arguments.limit));
+  Sort(arguments, &response);
+  bool cut = !response.next_page_token().empty();
   const uint64_t limit = arguments.limit;
-  if (sorts && limit > 0 && static_cast<uint64_t>(response->hulls_size()) > limit) {
+  if (sorts && limit > 0 && static_cast<uint64_t>(response.hulls_size()) > limit) {
     const int keep = static_cast<int>(limit);
-    response->mutable_hulls()->DeleteSubrange(keep, response->hulls_size() - keep);
+    response.mutable_hulls()->DeleteSubrange(keep, response.hulls_size() - keep);
     cut = true;
   }
   if (arguments.count) {
     uint64_t bodies = 0;
     if (!run.names()) {
-      const auto listed = run.MakeClient().ListAllBodies(arguments.prefix);
-      if (!listed.ok()) return run.Fail(listed.status());
-      bodies = static_cast<uint64_t>(listed->bodies_size());
+      HULLD_ASSIGN_OR_FAIL(run.Fail, const auto listed,
+                           run.MakeClient().ListAllBodies(arguments.prefix));
+      bodies = static_cast<uint64_t>(listed.bodies_size());
     }
-    PrintCount(run, *response, bodies);
+    PrintCount(run, response, bodies);
   } else if (run.json()) {
-    run.out << MessageJson(*response) << "\n";
+    run.out << MessageJson(response) << "\n";
   } else if (run.names()) {
-    for (const v1::HullInfo& hull : response->hulls()) run.out << hull.hull_id() << "\n";
+    for (const v1::HullInfo& hull : response.hulls()) run.out << hull.hull_id() << "\n";
   } else {
-    PrintHullTable(run, *response);
+    PrintHullTable(run, response);
   }
-  for (const v1::HullInfo& hull : response->hulls()) {
+  for (const v1::HullInfo& hull : response.hulls()) {
     if (!hull.damaged()) continue;
     run.err << "hullctl: " << hull.hull_id()
             << " is damaged in the store; it can only be deleted\n";

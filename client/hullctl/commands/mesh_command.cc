@@ -6,13 +6,9 @@
 
 #include "client/formats/point_file.h"
 #include "client/formats/text_number.h"
-#include "client/hullctl/command_line/freshness_options.h"
-#include "client/hullctl/command_line/output_file.h"
-#include "client/hullctl/commands/commands.h"
+#include "client/hullctl/command_line/commands.h"
 #include "client/hullctl/printing/json.h"
-#include "client/hullctl/printing/mesh_obj.h"
 #include "client/hullctl/printing/progress_bar.h"
-#include "client/hullctl/printing/table.h"
 #include "client/verify/simplification_check.h"
 
 namespace hulld {
@@ -55,6 +51,41 @@ void WriteMessages(const HullMesh& mesh, std::ostream& out) {
   out << MessageJson(facets) << "\n";
 }
 
+// Returns the origin of a simplified mesh and its proven error, as in ", simplified from 72
+// vertices within 0.5"; empty for a hull itself.
+std::string ErrorText(const HullMesh& mesh) {
+  if (!mesh.header.has_error()) return "";
+  return ", simplified from " + std::to_string(mesh.header.hull().vertex_count()) +
+         " vertices within " + ShortestText(mesh.header.error());
+}
+
+// Writes a hull as OBJ text: vertices in canonical order with the shortest digits that read back as
+// the same doubles, and maximal facets. A hull of dimension 1 is an edge `l`, one of dimension 0 a
+// point `p`; an empty hull has only the comment.
+void WriteObj(const HullMesh& mesh, std::ostream& out) {
+  const v1::HullInfo& hull = mesh.header.hull();
+  out << "# hull " << hull.hull_id() << " revision " << hull.revision() << ": dimension "
+      << hull.dimension() << ", " << mesh.vertex_count() << " vertices, " << mesh.facet_sizes.size()
+      << " facets" << ErrorText(mesh) << "\n";
+  for (size_t i = 0; i < mesh.xyz.size(); i += 3) {
+    out << "v " << ShortestText(mesh.xyz[i]) << " " << ShortestText(mesh.xyz[i + 1]) << " "
+        << ShortestText(mesh.xyz[i + 2]) << "\n";
+  }
+  if (mesh.facet_sizes.empty()) {
+    if (mesh.vertex_count() == 1) out << "p 1\n";
+    if (mesh.vertex_count() == 2) out << "l 1 2\n";
+  }
+  size_t next = 0;
+  for (const uint32_t size : mesh.facet_sizes) {
+    out << "f";
+    // OBJ counts from 1.
+    for (const size_t end = next + size; next < end; ++next) {
+      out << " " << uint64_t{mesh.facet_indices[next]} + 1;
+    }
+    out << "\n";
+  }
+}
+
 // Returns the mesh. With --verify, its verification states any claim that does not hold.
 absl::StatusOr<VerifiedMesh> Fetch(const Invocation& run, const MeshArguments& arguments) {
   const v1::GetHullMeshRequest request = RequestFor(arguments);
@@ -93,23 +124,21 @@ ExitCode Mesh(const Invocation& run, const MeshArguments& arguments) {
                                       ": meshes are written as OBJ; choose a name that ends in "
                                       ".obj, and convert the file"));
   }
-  const auto fetched = Fetch(run, arguments);
-  if (!fetched.ok()) return run.Fail(fetched.status());
-  if (arguments.verify && fetched->verification.verdict != Verdict::kValid) {
-    return RefuseSimplification(run, fetched->verification);
+  HULLD_ASSIGN_OR_FAIL(run.Fail, const auto fetched, Fetch(run, arguments));
+  if (arguments.verify && fetched.verification.verdict != Verdict::kValid) {
+    return RefuseSimplification(run, fetched.verification);
   }
-  const HullMesh* const mesh = &fetched->mesh;
-  const absl::Status written = WriteOutput(arguments.file, run.out, [&](std::ostream& out) {
+  const HullMesh* const mesh = &fetched.mesh;
+  const ExitCode written = run.WriteFile(arguments.file, [&](std::ostream& out) {
     run.json() ? WriteMessages(*mesh, out) : WriteObj(*mesh, out);
   });
-  if (!written.ok()) return run.FailUsage(written);
-  if (!arguments.file.empty() && arguments.file != "-") {
+  if (written == ExitCode::kDone && !arguments.file.empty() && arguments.file != "-") {
     run.err << arguments.file << ": " << Counted(mesh->vertex_count(), "vertex", "vertices") << ", "
             << Counted(mesh->facet_sizes.size(), "facet") << " of " << arguments.hull_id
             << " at revision " << mesh->header.hull().revision() << ErrorText(*mesh)
             << (arguments.verify ? ", verified" : "") << "\n";
   }
-  return ExitCode::kDone;
+  return written;
 }
 
 }  // namespace

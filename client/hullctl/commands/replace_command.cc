@@ -4,9 +4,8 @@
 #include <memory>
 #include <optional>
 
+#include "client/hullctl/command_line/commands.h"
 #include "client/hullctl/command_line/point_input.h"
-#include "client/hullctl/commands/commands.h"
-#include "client/hullctl/printing/json.h"
 #include "client/hullctl/printing/progress_bar.h"
 #include "client/hullctl/printing/table.h"
 
@@ -45,8 +44,7 @@ absl::Status NoPoints(const std::string& files) {
 
 ExitCode Replace(const Invocation& run, const ReplaceArguments& arguments) {
   uint64_t total_bytes = 0;
-  auto plan = PlanReads(arguments.input, &total_bytes);
-  if (!plan.ok()) return run.FailUsage(plan.status());
+  HULLD_ASSIGN_OR_FAIL(run.FailUsage, auto plan, PlanReads(arguments.input, &total_bytes));
   v1::ReplaceOpen open;
   open.set_hull_id(arguments.hull_id);
   open.set_create_if_absent(arguments.create);
@@ -58,7 +56,7 @@ ExitCode Replace(const Invocation& run, const ReplaceArguments& arguments) {
   const auto feed = [&](const Client::PointSink& sink) -> absl::Status {
     uint64_t bytes_before = 0;
     uint64_t points = 0;
-    for (ReadRequest& request : *plan) {
+    for (ReadRequest& request : plan) {
       request.options.allow_empty = true;
       uint64_t file_bytes = 0;
       absl::Status stream;

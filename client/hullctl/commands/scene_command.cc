@@ -6,16 +6,11 @@
 #include <unordered_map>
 
 #include "client/formats/text_number.h"
-#include "client/hullctl/command_line/freshness_options.h"
-#include "client/hullctl/command_line/query_options.h"
-#include "client/hullctl/commands/commands.h"
-#include "client/hullctl/printing/answer_row.h"
-#include "client/hullctl/printing/answer_text.h"
+#include "client/hullctl/command_line/commands.h"
+#include "client/hullctl/commands/scene_answers.h"
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/printing/progress_bar.h"
 #include "client/hullctl/printing/table.h"
-#include "client/hullctl/scene/scene_commands.h"
-#include "client/hullctl/scene/scene_file.h"
 
 namespace hulld {
 namespace {
@@ -71,7 +66,7 @@ class SceneRun {
       if (scene_.HullOf(a) == nullptr || scene_.HullOf(b) == nullptr) {
         return absl::InternalError("the answer refers to a placement that does not exist");
       }
-      if (!run_.json()) Print(a, b, RowAt(part.columns(), i), cause);
+      if (!run_.json()) PrintPair(run_, scene_, a, b, RowAt(part.columns(), i), cause);
     }
     bar_.Update(found_ += static_cast<uint64_t>(count));
     if (part.has_totals()) {
@@ -79,18 +74,6 @@ class SceneRun {
       complete_ = true;
     }
     return absl::OkStatus();
-  }
-
-  void Print(uint32_t a, uint32_t b, const AnswerRow& row, const std::string* cause) {
-    bar_.Clear();
-    run_.out << scene_.NameOf(a) << "\t" << scene_.NameOf(b) << "\t";
-    if (cause != nullptr) {
-      run_.out << run_.paint(Hue::kBad, "FAILED") << (run_.names() ? "" : "\t" + *cause) << "\n";
-    } else {
-      const auto pieces = scene_.NamesOfPieces(a, b, row.pieces.value_or(std::pair(-1, -1)));
-      run_.out << (run_.names() ? RelationText(row.relation) : RowText(row, run_.paint, pieces))
-               << "\n";
-    }
   }
 
   void PrintTotals() {
@@ -159,21 +142,21 @@ ExitCode FindInScene(const Invocation& run, const SceneArguments& arguments) {
     return run.FailUsage(
         "FILE is required: 'hullctl scene FILE', or 'hullctl scene apply|check|diff|delete FILE'");
   }
-  auto read = ReadWholeScene(arguments.file, "scene", FormFor(arguments.details));
-  if (!read.ok()) return run.FailUsage(read.status());
-  if (read->pairs.has_value()) {
+  HULLD_ASSIGN_OR_FAIL(run.FailUsage, auto read,
+                       ReadWholeScene(arguments.file, "scene", FormFor(arguments.details)));
+  if (read.pairs.has_value()) {
     return run.FailUsage(
         absl::StrCat(arguments.file,
                      ": 'hullctl scene FILE' finds pairs itself, but the file names pairs; use "
                      "'hullctl scene check' or 'hullctl batch', or remove the pairs"));
   }
-  return Find(run, arguments, &*read);
+  return Find(run, arguments, &read);
 }
 
 ExitCode CheckScene(const Invocation& run, const SceneArguments& arguments) {
-  auto read = ReadWholeScene(arguments.file, "scene", FormFor(arguments.details));
-  if (!read.ok()) return run.FailUsage(read.status());
-  if (read->pairs.has_value()) {
+  HULLD_ASSIGN_OR_FAIL(run.FailUsage, auto read,
+                       ReadWholeScene(arguments.file, "scene", FormFor(arguments.details)));
+  if (read.pairs.has_value()) {
     const char* const option = arguments.nearest > 0   ? "--nearest"
                                : arguments.first       ? "--first"
                                : arguments.every_piece ? "--every-piece"
@@ -183,9 +166,9 @@ ExitCode CheckScene(const Invocation& run, const SceneArguments& arguments) {
           arguments.file, ": ", option,
           " finds pairs itself, but the file names pairs; remove the option or the pairs"));
     }
-    return AnswerPairs(run, arguments.file, *read, arguments.details, /*colliding=*/false);
+    return AnswerPairs(run, arguments.file, read, arguments.details, /*colliding=*/false);
   }
-  return Find(run, arguments, &*read);
+  return Find(run, arguments, &read);
 }
 
 void AddCheck(Command scene, Invocation* invocation) {

@@ -2,9 +2,8 @@
 #include <absl/strings/str_replace.h>
 #include <google/protobuf/descriptor.h>
 
-#include "client/hullctl/commands/commands.h"
+#include "client/hullctl/command_line/commands.h"
 #include "client/hullctl/printing/answer_text.h"
-#include "client/hullctl/printing/json.h"
 #include "client/hullctl/printing/table.h"
 
 namespace hulld {
@@ -57,14 +56,13 @@ void PrintStatus(const Invocation& run, const v1::GetStatusResponse& status,
 
 ExitCode Status(const Invocation& run) {
   const Client client = run.MakeClient();
-  const auto status = client.GetStatus();
-  if (!status.ok()) return run.Fail(status.status());
+  HULLD_ASSIGN_OR_FAIL(run.Fail, const auto status, client.GetStatus());
   const absl::Status health = client.CheckHealth();
   // A server without the health service is healthy if it answers.
   const bool serving = health.ok() || absl::IsUnimplemented(health);
   const char* const text = health.ok() ? "SERVING" : serving ? "UNKNOWN" : "NOT_SERVING";
-  if (!run.PrintForPrograms(*status, text)) {
-    PrintStatus(run, *status, text);
+  if (!run.PrintForPrograms(status, text)) {
+    PrintStatus(run, status, text);
   }
   if (serving) return ExitCode::kDone;
   return run.Fail(health);

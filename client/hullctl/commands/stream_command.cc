@@ -5,13 +5,9 @@
 
 #include "client/formats/byte_source.h"
 #include "client/formats/text_number.h"
-#include "client/hullctl/command_line/freshness_options.h"
-#include "client/hullctl/command_line/query_options.h"
-#include "client/hullctl/commands/commands.h"
-#include "client/hullctl/printing/answer_row.h"
-#include "client/hullctl/printing/answer_text.h"
+#include "client/hullctl/command_line/commands.h"
+#include "client/hullctl/commands/scene_answers.h"
 #include "client/hullctl/printing/json.h"
-#include "client/hullctl/scene/scene_file.h"
 
 namespace hulld {
 namespace {
@@ -80,16 +76,13 @@ class StreamRun {
       const uint32_t a = pairs_[2 * answer.pairs(i)];
       const uint32_t b = pairs_[2 * answer.pairs(i) + 1];
       const AnswerRow row = RowAt(answer.columns(), i);
-      run_.out << answer.update() << "\t" << scene_.NameOf(a) << "\t" << scene_.NameOf(b) << "\t";
-      if (row.relation == v1::RELATION_UNSPECIFIED) {
-        const auto cause = causes.find(static_cast<uint64_t>(i));
-        const std::string text = cause != causes.end() ? cause->second : ProblemOf(a, b);
-        run_.out << run_.paint(Hue::kBad, "FAILED") << (run_.names() ? "" : "\t" + text) << "\n";
-      } else {
-        const auto pieces = scene_.NamesOfPieces(a, b, row.pieces.value_or(std::pair(-1, -1)));
-        run_.out << (run_.names() ? RelationText(row.relation) : RowText(row, run_.paint, pieces))
-                 << "\n";
-      }
+      const bool is_answered = row.relation != v1::RELATION_UNSPECIFIED;
+      const auto cause = causes.find(static_cast<uint64_t>(i));
+      const std::string problem = is_answered             ? ""
+                                  : cause != causes.end() ? cause->second
+                                                          : ProblemOf(a, b);
+      run_.out << answer.update() << "\t";
+      PrintPair(run_, scene_, a, b, row, is_answered ? nullptr : &problem);
     }
     run_.out << std::flush;
   }
@@ -122,29 +115,25 @@ bool NextLine(ByteSource* source, std::string* text) {
 }
 
 ExitCode Stream(const Invocation& run, const StreamArguments& arguments) {
-  const auto source = ByteSource::Open(arguments.file);
-  if (!source.ok()) return run.FailUsage(source.status());
-  auto scene = ReadScene(source->get());
-  if (!scene.ok()) return run.FailUsage(scene.status());
-  auto pairs = PairsOf(*scene, arguments.file);
-  if (!pairs.ok()) return run.FailUsage(pairs.status());
-  arguments.details.Apply(&scene->request);
-  StreamRun stream(run, *scene, *std::move(pairs));
-  absl::Status status = stream.Open(scene->only_changes || arguments.only_changes);
+  HULLD_ASSIGN_OR_FAIL(run.FailUsage, const auto source, ByteSource::Open(arguments.file));
+  HULLD_ASSIGN_OR_FAIL(run.FailUsage, auto scene, ReadScene(source.get()));
+  HULLD_ASSIGN_OR_FAIL(run.FailUsage, auto pairs, PairsOf(scene, arguments.file));
+  arguments.details.Apply(&scene.request);
+  StreamRun stream(run, scene, std::move(pairs));
+  absl::Status status = stream.Open(scene.only_changes || arguments.only_changes);
   std::string text;
-  while (status.ok() && NextLine(source->get(), &text)) {
+  while (status.ok() && NextLine(source.get(), &text)) {
     v1::CollisionStreamUpdate update;
     const absl::Status parsed = ParseJson(text, UnknownFields::kRefuse, &update);
     if (!parsed.ok()) {
-      return run.FailUsage(
-          (*source)->ErrorAtLine(std::string(parsed.message().data(), parsed.message().size())));
+      return run.FailUsage(source->ErrorAtLine(std::string(parsed.message())));
     }
     status = stream.Update(std::move(update));
   }
-  if (!status.ok()) return run.Fail(scene->InKeys(status));
-  if (!(*source)->status().ok()) return run.FailUsage((*source)->status());
+  if (!status.ok()) return run.Fail(scene.InKeys(status));
+  if (!source->status().ok()) return run.FailUsage(source->status());
   status = stream.Close();
-  return status.ok() ? ExitCode::kDone : run.Fail(scene->InKeys(status));
+  return status.ok() ? ExitCode::kDone : run.Fail(scene.InKeys(status));
 }
 
 }  // namespace

@@ -12,7 +12,7 @@
 #include <memory>
 #include <string>
 
-#include "client/hullctl/commands/commands.h"
+#include "client/hullctl/command_line/commands.h"
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/printing/table.h"
 
@@ -58,19 +58,18 @@ absl::Status WriteTokenFile(const std::string& path, const std::string& token) {
 }
 
 ExitCode NewToken(const Invocation& run, const TokenArguments& arguments) {
-  const absl::StatusOr<std::string> token = RandomToken();
-  if (!token.ok()) return run.FailUsage(token.status());
+  HULLD_ASSIGN_OR_FAIL(run.FailUsage, const std::string token, RandomToken());
   const std::string line =
       absl::StrCat(arguments.name, " ", arguments.role, " ",
-                   arguments.prefix.empty() ? "*" : arguments.prefix, " ", HashText(*token));
+                   arguments.prefix.empty() ? "*" : arguments.prefix, " ", HashText(token));
   if (!arguments.file.empty()) {
-    const absl::Status written = WriteTokenFile(arguments.file, *token);
+    const absl::Status written = WriteTokenFile(arguments.file, token);
     if (!written.ok()) return run.FailUsage(written);
     run.out << line << "\n";
   } else if (run.json()) {
-    run.out << JsonObject().Add("token", *token).Add("line", line).Close() << "\n";
+    run.out << JsonObject().Add("token", token).Add("line", line).Close() << "\n";
   } else {
-    Table().Row({"token", *token}).Row({"line", line}).Print(run.out);
+    Table().Row({"token", token}).Row({"line", line}).Print(run.out);
   }
   return ExitCode::kDone;
 }

@@ -3,7 +3,7 @@
 #include <memory>
 
 #include "client/formats/byte_source.h"
-#include "client/hullctl/commands/commands.h"
+#include "client/hullctl/command_line/commands.h"
 #include "client/hullctl/printing/answer_text.h"
 #include "client/hullctl/printing/json.h"
 #include "client/verify/answer_check.h"
@@ -18,33 +18,26 @@ struct RecordedAnswer {
 };
 
 absl::StatusOr<RecordedAnswer> ReadAnswer(const std::string& path) {
-  const auto text = ReadText(path);
-  if (!text.ok()) return text.status();
+  HULLD_ASSIGN_OR_RETURN(const auto text, ReadText(path));
   RecordedAnswer answer;
-  absl::Status parsed = ParseMember(*text, "request", &answer.request);
-  if (parsed.ok()) parsed = ParseMember(*text, "response", &answer.response);
+  absl::Status parsed = ParseMember(text, "request", &answer.request);
+  if (parsed.ok()) parsed = ParseMember(text, "response", &answer.response);
   if (parsed.ok()) return answer;
   return absl::InvalidArgumentError(absl::StrCat(
       path, ": ", parsed.message(), "; write it with: hullctl check A B --record FILE"));
 }
 
 ExitCode Verify(const Invocation& run, const std::string& path) {
-  const auto answer = ReadAnswer(path);
-  if (!answer.ok()) return run.FailUsage(answer.status());
+  HULLD_ASSIGN_OR_FAIL(run.FailUsage, const auto answer, ReadAnswer(path));
   const Client client = run.MakeClient();
   AnswerChecker checker(client);
-  const v1::CheckCollisionResponse& response = answer->response;
-  const auto verification = checker.Check(answer->request, response);
-  if (!verification.ok()) return run.Fail(verification.status());
-  if (run.json()) {
-    run.out << VerificationJson(*verification) << "\n";
-  } else if (run.names()) {
-    run.out << RelationText(response.relation()) << "\n";
-  } else {
+  const v1::CheckCollisionResponse& response = answer.response;
+  HULLD_ASSIGN_OR_FAIL(run.Fail, const auto verification, checker.Check(answer.request, response));
+  if (!run.PrintForPrograms(VerificationJson(verification), RelationText(response.relation()))) {
     run.out << PaintedRelation(response.relation(), run.paint) << ": "
-            << VerificationText(*verification, run.paint) << "\n";
+            << VerificationText(verification, run.paint) << "\n";
   }
-  return run.Judge(*verification);
+  return run.Judge(verification);
 }
 
 }  // namespace

@@ -5,16 +5,14 @@
 
 #include <algorithm>
 #include <atomic>
-#include <filesystem>
 #include <memory>
 
+#include "client/base/status_macros.h"
 #include "client/formats/text_number.h"
+#include "client/hullctl/command_line/commands.h"
 #include "client/hullctl/command_line/interrupt.h"
-#include "client/hullctl/command_line/output_file.h"
-#include "client/hullctl/commands/commands.h"
 #include "client/hullctl/local/file_shape.h"
 #include "client/hullctl/local/local_server.h"
-#include "client/hullctl/printing/table.h"
 #include "client/hullctl/robot/robot_scene.h"
 #include "client/hullctl/scene/recorded_watch.h"
 #include "client/hullctl/scene/scene_sync.h"
@@ -26,7 +24,6 @@
 #include "client/hullctl/view/page_session.h"
 #include "client/hullctl/view/recording.h"
 #include "client/hullctl/view/temporary_hulls.h"
-#include "client/status_macros.h"
 
 namespace hulld {
 namespace {
@@ -129,9 +126,7 @@ class Viewing {
 
  private:
   ExitCode LoadDemo() {
-    auto scenes = MakeDemoScenes(program_.client, &temporary_);
-    if (!scenes.ok()) return run_.Fail(scenes.status());
-    program_.scenes = *std::move(scenes);
+    HULLD_ASSIGN_OR_FAIL(run_.Fail, program_.scenes, MakeDemoScenes(program_.client, &temporary_));
     const ViewScene& last = program_.scenes.back();
     growing_ = std::make_unique<GrowingHull>(program_.client, last.objects[kGrowingObject].hull_id);
     program_.on_show = [this](const std::string& key) {
@@ -261,31 +256,29 @@ class Viewing {
   }
 
   ExitCode WriteHtml() {
-    const auto recording = RecordScene(program_, program_.scenes.front());
-    if (!recording.ok()) return run_.Fail(recording.status());
-    const absl::Status written =
-        WriteOutput(arguments_.html_file, run_.out,
-                    [&](std::ostream& out) { out << StandalonePage(*recording); });
-    if (!written.ok()) return run_.FailUsage(written);
-    if (arguments_.html_file == "-") return ExitCode::kDone;
+    HULLD_ASSIGN_OR_FAIL(run_.Fail, const auto recording,
+                         RecordScene(program_, program_.scenes.front()));
     const size_t count = program_.scenes.front().objects.size();
-    run_.out << arguments_.html_file << ": " << Counted(count, "object")
-             << "; open it in a browser\n";
-    return ExitCode::kDone;
+    return Write(arguments_.html_file, StandalonePage(recording),
+                 absl::StrCat(Counted(count, "object"), "; open it in a browser"));
   }
 
   ExitCode WritePng() {
-    const auto recording = RecordScene(program_, program_.scenes.front());
-    if (!recording.ok()) return run_.Fail(recording.status());
-    const auto picture = PictureOf(PicturePage(*recording, arguments_.size));
-    if (!picture.ok()) return run_.Fail(picture.status());
-    const absl::Status written =
-        WriteOutput(arguments_.png_file, run_.out, [&](std::ostream& out) { out << *picture; });
-    if (!written.ok()) return run_.FailUsage(written);
-    if (arguments_.png_file == "-") return ExitCode::kDone;
-    run_.out << arguments_.png_file << ": " << arguments_.size.width << " by "
-             << arguments_.size.height << " pixels\n";
-    return ExitCode::kDone;
+    HULLD_ASSIGN_OR_FAIL(run_.Fail, const auto recording,
+                         RecordScene(program_, program_.scenes.front()));
+    HULLD_ASSIGN_OR_FAIL(run_.Fail, const auto picture,
+                         PictureOf(PicturePage(recording, arguments_.size)));
+    return Write(arguments_.png_file, picture,
+                 absl::StrCat(arguments_.size.width, " by ", arguments_.size.height, " pixels"));
+  }
+
+  // Writes a file of the scene and reports its content, unless it is standard output.
+  ExitCode Write(const std::string& file, const std::string& bytes, const std::string& content) {
+    const ExitCode written = run_.WriteFile(file, [&](std::ostream& out) { out << bytes; });
+    if (written == ExitCode::kDone && file != "-") {
+      run_.out << file << ": " << content << "\n";
+    }
+    return written;
   }
 
   ExitCode Serve() {
@@ -294,13 +287,12 @@ class Viewing {
     options.open_page = [this](std::shared_ptr<PageChannel> page) {
       return std::make_unique<PageSession>(program_, std::move(page));
     };
-    const auto bridge = Bridge::Start(std::move(options));
-    if (!bridge.ok()) return run_.FailUsage(bridge.status());
-    run_.out << "viewer at " << (*bridge)->Address() << "\n"
+    HULLD_ASSIGN_OR_FAIL(run_.FailUsage, const auto bridge, Bridge::Start(std::move(options)));
+    run_.out << "viewer at " << bridge->Address() << "\n"
              << "the address works once, in one browser; Ctrl-C ends the viewer" << std::endl;
     std::unique_ptr<AddressFile> address;
     if (!arguments_.no_open && isatty(STDOUT_FILENO) != 0) {
-      address = std::make_unique<AddressFile>((*bridge)->Address());
+      address = std::make_unique<AddressFile>(bridge->Address());
       OpenInBrowser(address->path());
     }
     interrupted_.wait(false);
@@ -354,11 +346,10 @@ ExitCode View(const Invocation& run, const ViewArguments& arguments) {
                          }));
   if (!is_temporary || run.local) return Viewing(run, arguments).Run();
   // All hulls are temporary: a private server stores them.
-  const auto server = LocalServer::Start();
-  if (!server.ok()) return run.FailUsage(server.status());
+  HULLD_ASSIGN_OR_FAIL(run.FailUsage, const auto server, LocalServer::Start());
   Invocation local = run;
   local.local = true;
-  local.server = (*server)->address();
+  local.server = server->address();
   local.security = {};
   return Viewing(local, arguments).Run();
 }

@@ -8,9 +8,8 @@
 #include <string>
 #include <utility>
 
-#include "client/formats/text_number.h"
+#include "client/hullctl/command_line/commands.h"
 #include "client/hullctl/command_line/interrupt.h"
-#include "client/hullctl/commands/commands.h"
 #include "client/hullctl/printing/answer_row.h"
 #include "client/hullctl/printing/answer_text.h"
 #include "client/hullctl/printing/json.h"
@@ -61,34 +60,20 @@ void PrintHullEvents(const v1::WatchHullsResponse& message, const Invocation& ru
   if (message.synced()) run.out << "# synced at revision " << message.header().revision() << "\n";
 }
 
-// A watch that ends at Ctrl-C.
-template <typename Watch>
-class Ending {
- public:
-  explicit Ending(std::unique_ptr<Watch> watch)
-      : watch_(std::move(watch)), interrupt_([this] {
-          is_ended_ = true;
-          watch_->Cancel();
-        }) {}
-
-  Watch& watch() { return *watch_; }
-  bool is_ended() const { return is_ended_; }
-
- private:
-  const std::unique_ptr<Watch> watch_;
-  std::atomic<bool> is_ended_ = false;
-  // Declared last, so that it is destroyed before the watch that it calls.
-  const Interrupt interrupt_;
-};
-
 // Prints messages until the watch ends, the callback returns true, or Ctrl-C. Returns the error
 // that ended the watch.
 template <typename Watch, typename Print>
-absl::Status PrintAll(const Invocation& run, std::unique_ptr<Watch> watch, const Print& print) {
-  Ending<Watch> ending(std::move(watch));
+absl::Status PrintAll(const Invocation& run, const std::unique_ptr<Watch> watch,
+                      const Print& print) {
+  std::atomic<bool> is_interrupted = false;
+  // Destroyed before the watch that it calls.
+  const Interrupt interrupt([&] {
+    is_interrupted = true;
+    watch->Cancel();
+  });
   while (true) {
-    const auto message = ending.watch().Next();
-    if (!message.ok()) return ending.is_ended() ? absl::OkStatus() : message.status();
+    const auto message = watch->Next();
+    if (!message.ok()) return is_interrupted ? absl::OkStatus() : message.status();
     if (run.json()) run.out << MessageJson(*message) << "\n";
     const bool is_enough = print(*message);
     run.out << std::flush;
@@ -141,23 +126,22 @@ std::string DecidingPieces(const Scene& scene, const v1::CollisionEvent& event) 
 }
 
 ExitCode WatchScene(const Invocation& run, const WatchOptions& options) {
-  const auto scene = ReadWholeScene(options.scene, "watch");
-  if (!scene.ok()) return run.FailUsage(scene.status());
+  HULLD_ASSIGN_OR_FAIL(run.FailUsage, const auto scene, ReadWholeScene(options.scene, "watch"));
   uint64_t events = 0;
   bool is_synced = false;
   const auto print = [&](const v1::WatchCollisionsResponse& message) {
     for (const v1::PlacementProblem& problem : message.placement_problems()) {
-      run.err << "hullctl: placement " << scene->NameOf(problem.placement()) << ": "
-              << scene->ProblemText(problem.placement(), problem) << "\n";
+      run.err << "hullctl: placement " << scene.NameOf(problem.placement()) << ": "
+              << scene.ProblemText(problem.placement(), problem) << "\n";
     }
     for (const v1::CollisionEvent& event : message.events()) {
       if (run.json()) break;
-      run.out << KindText(event.kind()) << "\t" << scene->NameOf(event.placement_a()) << "\t"
-              << scene->NameOf(event.placement_b());
+      run.out << KindText(event.kind()) << "\t" << scene.NameOf(event.placement_a()) << "\t"
+              << scene.NameOf(event.placement_b());
       if (event.kind() != v1::COLLISION_EVENT_KIND_LOST) {
         run.out << "\t" << event.revision_a() << "\t" << event.revision_b();
       }
-      const auto pieces = DecidingPieces(*scene, event);
+      const auto pieces = DecidingPieces(scene, event);
       if (!pieces.empty()) run.out << "\t" << pieces;
       run.out << "\n";
     }
@@ -168,9 +152,8 @@ ExitCode WatchScene(const Invocation& run, const WatchOptions& options) {
     events += static_cast<uint64_t>(message.events_size());
     return (options.events > 0 && events >= options.events) || (options.until_synced && is_synced);
   };
-  const absl::Status status =
-      PrintAll(run, run.MakeClient().WatchCollisions(OpenOf(*scene)), print);
-  return status.ok() ? ExitCode::kDone : run.Fail(scene->InKeys(status));
+  const absl::Status status = PrintAll(run, run.MakeClient().WatchCollisions(OpenOf(scene)), print);
+  return status.ok() ? ExitCode::kDone : run.Fail(scene.InKeys(status));
 }
 
 }  // namespace

@@ -1,7 +1,6 @@
 #include "client/hullctl/completion/completion.h"
 
 #include <absl/strings/match.h>
-#include <absl/strings/str_cat.h>
 
 #include <algorithm>
 #include <utility>
@@ -82,24 +81,12 @@ void OfferValues(const OptionDescription& option, const std::string& start,
     if (absl::StartsWith(choice, start)) completion->candidates.push_back({front + choice, ""});
   }
   if (!option.choices.empty()) return;
-  switch (option.value_kind) {
-    case ValueKind::kText:
-      return;
-    case ValueKind::kFile:
-      completion->files = true;
-      return;
-    case ValueKind::kDirectory:
-      completion->directories = true;
-      return;
-    case ValueKind::kHull:
-    case ValueKind::kBody:
-    case ValueKind::kPlaced:
-    case ValueKind::kShape:
-    case ValueKind::kContext:
-      break;
-  }
-  completion->files = option.value_kind == ValueKind::kShape;
-  for (Candidate& value : values(option.value_kind, start)) {
+  const ValueKind kind = option.value_kind;
+  if (kind == ValueKind::kText) return;
+  completion->files = kind == ValueKind::kFile || kind == ValueKind::kShape;
+  completion->directories = kind == ValueKind::kDirectory;
+  if (kind == ValueKind::kFile || kind == ValueKind::kDirectory) return;
+  for (Candidate& value : values(kind, start)) {
     value.text = front + value.text;
     completion->candidates.push_back(std::move(value));
   }

@@ -9,6 +9,8 @@
 
 namespace hulld {
 
+struct Invocation;
+
 // A possible word at the cursor.
 struct Candidate {
   std::string text;
@@ -30,10 +32,24 @@ using ValueSource = std::function<std::vector<Candidate>(ValueKind kind, const s
 Completion Complete(const CommandDescription& program, const std::vector<std::string>& words,
                     const ValueSource& values);
 
+// Returns names of contexts from the file, and IDs of hulls from the server that the invocation's
+// options name. Returns nothing if the server does not answer within half a second, or refuses.
+// Many IDs are abbreviated to their text before the next "/". `invocation` must outlive the result.
+ValueSource ValuesFor(Invocation* invocation);
+
 // Returns the program's own options among the words, with their values, except for the last word.
 // They determine the server to query.
 std::vector<std::string> ProgramOptionsIn(const CommandDescription& program,
                                           const std::vector<std::string>& words);
+
+// Hidden first argument that requests completions. The remaining arguments are the words after the
+// program's name up to the cursor. Each line of the answer is a candidate, a tab, and its help; the
+// last line is ":", then "files", "directories", or nothing: the shell's own completion to add.
+inline constexpr char kCompleteCommand[] = "__complete";
+
+// Returns the script that makes bash, zsh, or fish complete hullctl's command lines. `shell` is one
+// of these three names.
+std::string CompletionScript(const std::string& shell);
 
 }  // namespace hulld
 

@@ -1,4 +1,4 @@
-#include "client/hullctl/completion/completion_script.h"
+#include "client/hullctl/completion/completion.h"
 
 namespace hulld {
 namespace {

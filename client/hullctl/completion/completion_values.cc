@@ -1,14 +1,13 @@
-#include "client/hullctl/completion/completion_values.h"
-
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
 #include <set>
 #include <string>
-#include <utility>
 
 #include "client/hullctl/command_line/connection.h"
+#include "client/hullctl/command_line/invocation.h"
+#include "client/hullctl/completion/completion.h"
 #include "client/hullctl/context/context_file.h"
 
 namespace hulld {
@@ -58,8 +57,7 @@ std::vector<Candidate> HullsAndBodies(Invocation* invocation, ValueKind kind,
     }
     many = many || !bodies->next_page_token().empty();
   }
-  std::sort(candidates.begin(), candidates.end(),
-            [](const Candidate& a, const Candidate& b) { return a.text < b.text; });
+  std::ranges::sort(candidates, {}, &Candidate::text);
   std::set<std::string> parts;
   for (const Candidate& candidate : candidates) {
     parts.insert(candidate.text.substr(0, candidate.text.find('/', start.size()) + 1));

@@ -3,12 +3,8 @@
 
 #include <absl/status/statusor.h>
 
-#include <functional>
 #include <map>
-#include <optional>
 #include <string>
-
-#include "client/client.h"
 
 namespace hulld {
 

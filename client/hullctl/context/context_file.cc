@@ -1,18 +1,15 @@
 #include "client/hullctl/context/context_file.h"
 
 #include <absl/strings/str_cat.h>
-#include <fcntl.h>
 #include <google/protobuf/struct.pb.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <vector>
 
 #include "client/formats/text_number.h"
@@ -126,7 +123,7 @@ absl::StatusOr<ContextFile> ReadContextFile() {
   if (text.size() > kMaxContextBytes) return Damaged(path, "the file is too large");
   Struct json;
   if (const absl::Status parsed = ParseJson(text, UnknownFields::kRefuse, &json); !parsed.ok()) {
-    const std::string message(parsed.message().data(), parsed.message().size());
+    const std::string message(parsed.message());
     return Damaged(path, "not JSON: " + message.substr(0, message.find('\n')));
   }
   for (const auto& [member, value] : json.fields()) {

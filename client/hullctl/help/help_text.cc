@@ -65,8 +65,7 @@ std::vector<CommandGroup> GroupsOf(const CommandDescription& command) {
   for (const auto& below : command.commands) {
     if (below->hidden) continue;
     const std::string title = below->group.empty() ? "Commands" : below->group;
-    auto group = std::find_if(groups.begin(), groups.end(),
-                              [&title](const CommandGroup& g) { return g.title == title; });
+    auto group = std::ranges::find(groups, title, &CommandGroup::title);
     if (group == groups.end()) group = groups.insert(groups.end(), {title, {}});
     group->commands.push_back(below.get());
   }

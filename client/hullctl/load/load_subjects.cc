@@ -2,11 +2,12 @@
 
 #include <absl/strings/str_cat.h>
 
-#include <cmath>
 #include <utility>
 
+#include "client/base/status_macros.h"
 #include "client/hullctl/load/point_generator.h"
-#include "client/status_macros.h"
+#include "client/packed_placements.h"
+#include "client/pose/rigid_pose.h"
 
 namespace hulld {
 namespace {
@@ -19,30 +20,14 @@ constexpr uint64_t kMaxPlacements = 256;
 // collides.
 constexpr double kHalfRoom = 1.3;
 
-v1::PointBlock MakePoints(Shape shape, uint64_t count, uint64_t seed) {
-  CloudOptions cloud;
-  cloud.shape = shape;
-  cloud.count = count;
-  cloud.seed = seed;
-  v1::PointBlock block;
-  block.mutable_xyz()->Reserve(static_cast<int>(3 * count));
-  GenerateCloud(cloud, [&block](const std::array<double, 3>& p) {
-    block.mutable_xyz()->Add(p.begin(), p.end());
-  });
-  return block;
-}
-
 void FillPlacement(const std::string& hull_id, Xoshiro256& random, v1::Placement* placement) {
   placement->set_hull_id(hull_id);
-  v1::Quaternion* const q = placement->mutable_pose()->mutable_rotation();
-  q->set_w(1.5 + random.NextSigned());  // never zero
-  q->set_x(random.NextSigned());
-  q->set_y(random.NextSigned());
-  q->set_z(random.NextSigned());
-  v1::Vector3* const t = placement->mutable_pose()->mutable_translation();
-  t->set_x(kHalfRoom * random.NextSigned());
-  t->set_y(kHalfRoom * random.NextSigned());
-  t->set_z(kHalfRoom * random.NextSigned());
+  RigidPose pose;
+  for (double& number : pose) number = random.NextSigned();
+  // Never zero.
+  pose[0] += 1.5;
+  for (size_t i = 4; i < 7; ++i) pose[i] *= kHalfRoom;
+  *placement->mutable_pose() = PoseOf(pose);
 }
 
 // Returns a connection with linearizable reads, which include all hulls of the load.
@@ -78,7 +63,7 @@ class LoadSubjects::LoadClient {
       }
     }
     if (Sends(LoadMode::kAppend)) {
-      points_ = MakePoints(Shape::kBall, settings_.points, static_cast<uint64_t>(index) + 1);
+      points_ = CloudPoints({Shape::kBall, settings_.points, static_cast<uint64_t>(index) + 1});
     }
   }
 
@@ -122,14 +107,13 @@ class LoadSubjects::LoadClient {
 
   // Waits until the chunk is acknowledged.
   absl::StatusOr<uint64_t> Append() {
-    absl::Status status;
     if (appender_ == nullptr) {
       AppendOptions options;
       options.create_if_absent = true;
       options.max_in_flight_chunks = 1;
       HULLD_ASSIGN_OR_RETURN(appender_, client_.OpenAppend(append_id_, options));
     }
-    status = appender_->Append(points_);
+    const absl::Status status = appender_->Append(points_);
     if (status.ok()) return settings_.points;
     appender_ = nullptr;
     return status;
@@ -168,9 +152,9 @@ absl::Status LoadSubjects::Create(const std::atomic<bool>& stop) {
     AppendOptions options;
     options.create_if_absent = true;
     HULLD_ASSIGN_OR_RETURN(auto appender, client_.OpenAppend(HullId(i), options));
-    absl::Status status = appender->Append(MakePoints(Shape::kSphere, settings_.vertices, i + 1));
-    if (status.ok()) status = appender->Finish();
-    if (!status.ok()) return status;
+    HULLD_RETURN_IF_ERROR(
+        appender->Append(CloudPoints({Shape::kSphere, settings_.vertices, i + 1})));
+    HULLD_RETURN_IF_ERROR(appender->Finish());
   }
   return absl::OkStatus();
 }

@@ -98,4 +98,12 @@ void GenerateCloud(const CloudOptions& options, const std::function<void(const P
   }
 }
 
+v1::PointBlock CloudPoints(const CloudOptions& options) {
+  v1::PointBlock points;
+  points.mutable_xyz()->Reserve(static_cast<int>(3 * options.count));
+  GenerateCloud(options,
+                [&points](const Point& p) { points.mutable_xyz()->Add(p.begin(), p.end()); });
+  return points;
+}
+
 }  // namespace hulld

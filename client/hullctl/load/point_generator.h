@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <functional>
 
+#include "hulld/v1/geometry.pb.h"
+
 namespace hulld {
 
 // xoshiro256++, with its state filled by splitmix64 from the seed. Source: Blackman and Vigna 2019,
@@ -42,6 +44,9 @@ struct CloudOptions {
 // are used. Points of the sphere lie on it up to rounding.
 void GenerateCloud(const CloudOptions& options,
                    const std::function<void(const std::array<double, 3>&)>& take);
+
+// Returns these points.
+v1::PointBlock CloudPoints(const CloudOptions& options);
 
 // Returns the smallest k with k^3 >= count.
 uint64_t LatticeSide(uint64_t count);

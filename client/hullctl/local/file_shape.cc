@@ -1,19 +1,17 @@
 #include "client/hullctl/local/file_shape.h"
 
 #include <absl/container/flat_hash_set.h>
-#include <absl/status/statusor.h>
 #include <absl/strings/str_cat.h>
 
 #include <array>
 #include <filesystem>
-#include <functional>
 #include <utility>
 
+#include "client/base/status_macros.h"
 #include "client/formats/point_file.h"
 #include "client/hullctl/body/hull_segment.h"
 #include "client/hullctl/command_line/point_input.h"
 #include "client/hullctl/local/local_server.h"
-#include "client/status_macros.h"
 
 namespace hulld {
 namespace {

@@ -15,7 +15,7 @@
 #include <utility>
 #include <vector>
 
-#include "client/status_macros.h"
+#include "client/base/status_macros.h"
 
 extern char** environ;
 
@@ -43,15 +43,9 @@ absl::StatusOr<std::string> FindServer() {
         absl::StrCat("HULLD_BINARY is ", named, ", which is not an executable program"));
   }
   std::error_code ignored;
-  std::vector<fs::path> folders = {fs::read_symlink("/proc/self/exe", ignored).parent_path()};
-  if (const char* const path = std::getenv("PATH"); path != nullptr) {
-    for (const auto folder : absl::StrSplit(path, ':', absl::SkipEmpty())) {
-      folders.emplace_back(std::string(folder.data(), folder.size()));
-    }
-  }
-  for (const fs::path& folder : folders) {
-    if (IsProgram(folder / "hulld")) return (folder / "hulld").string();
-  }
+  const fs::path folder = fs::read_symlink("/proc/self/exe", ignored).parent_path();
+  if (IsProgram(folder / "hulld")) return (folder / "hulld").string();
+  if (std::string found = FindProgram("hulld"); !found.empty()) return found;
   return absl::NotFoundError(
       "hulld is neither next to hullctl nor on the PATH; install it, or set HULLD_BINARY");
 }
@@ -93,6 +87,15 @@ absl::Status CannotStart(const char* what) {
 }
 
 }  // namespace
+
+std::string FindProgram(const std::string& name) {
+  const char* const path = std::getenv("PATH");
+  for (const auto folder : absl::StrSplit(path == nullptr ? "" : path, ':', absl::SkipEmpty())) {
+    const fs::path program = fs::path(std::string(folder.data(), folder.size())) / name;
+    if (IsProgram(program)) return program;
+  }
+  return "";
+}
 
 absl::StatusOr<int> LocalServer::Spawn(const std::string& program) {
   std::string folder = (fs::temp_directory_path() / "hullctl-XXXXXX").string();
@@ -141,14 +144,12 @@ absl::StatusOr<int> LocalServer::Spawn(const std::string& program) {
 }
 
 absl::StatusOr<std::unique_ptr<LocalServer>> LocalServer::Start() {
-  const auto program = FindServer();
-  if (!program.ok()) return program.status();
+  HULLD_ASSIGN_OR_RETURN(const auto program, FindServer());
   std::unique_ptr<LocalServer> server(new LocalServer);
-  const auto log = server->Spawn(*program);
-  if (!log.ok()) return log.status();
+  HULLD_ASSIGN_OR_RETURN(const auto log, server->Spawn(program));
   std::promise<std::pair<bool, std::string>> start;
   auto started = start.get_future();
-  server->log_reader_ = std::thread(ReadLog, *log, std::move(start));
+  server->log_reader_ = std::thread(ReadLog, log, std::move(start));
   const auto [has_started, text] = started.get();
   if (!has_started) {
     return absl::InternalError(absl::StrCat("the local server did not start: ", text));

@@ -43,6 +43,9 @@ class LocalServer {
   std::thread log_reader_;
 };
 
+// Returns the absolute path of an executable program on the PATH; empty if there is none.
+std::string FindProgram(const std::string& name);
+
 // Builds hulls on a private server, which is started when the first hull is built.
 class LocalHullBuilder {
  public:

@@ -1,10 +1,6 @@
-#include "client/hullctl/pairs/judge_command.h"
-
-#include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
 
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cmath>
 #include <map>
@@ -13,8 +9,9 @@
 #include <string>
 #include <vector>
 
+#include "client/base/status_macros.h"
 #include "client/formats/text_number.h"
-#include "client/hullctl/command_line/freshness_options.h"
+#include "client/hullctl/command_line/commands.h"
 #include "client/hullctl/local/file_shape.h"
 #include "client/hullctl/pairs/batch_answers.h"
 #include "client/hullctl/pairs/judged_table.h"
@@ -24,7 +21,6 @@
 #include "client/hullctl/printing/progress_bar.h"
 #include "client/hullctl/printing/table.h"
 #include "client/packed_placements.h"
-#include "client/status_macros.h"
 #include "client/verify/answer_check.h"
 
 namespace hulld {
@@ -112,9 +108,8 @@ class JudgeRun {
       if (!status.ok()) return run_.Fail(status);
     }
     bar_.Clear();
-    std::stable_sort(wrong_.begin(), wrong_.end(), [](const WrongAnswer& a, const WrongAnswer& b) {
-      return a.judgement.error > b.judgement.error;
-    });
+    const auto error = [](const WrongAnswer& wrong) { return wrong.judgement.error; };
+    std::ranges::stable_sort(wrong_, std::greater(), error);
     for (const WrongAnswer& wrong : wrong_) {
       const absl::Status proven = Prove(wrong);
       if (!proven.ok()) return run_.Fail(proven);
@@ -331,17 +326,17 @@ class JudgeRun {
 
 ExitCode JudgeTable(const Invocation& run, const JudgeArguments& arguments) {
   std::vector<std::string> ignored;
-  const auto answers = ReadJudgedTable(arguments.file, &ignored);
-  if (!answers.ok()) return run.FailUsage(answers.status());
+  HULLD_ASSIGN_OR_FAIL(run.FailUsage, const auto answers,
+                       ReadJudgedTable(arguments.file, &ignored));
   if (!ignored.empty()) {
     run.err << "hullctl: " << arguments.file
             << ": ignored columns: " << absl::StrJoin(ignored, ", ") << "\n";
   }
   JudgedHulls hulls;
-  if (absl::Status resolved = hulls.Resolve(run, *answers); !resolved.ok()) {
+  if (absl::Status resolved = hulls.Resolve(run, answers); !resolved.ok()) {
     return run.FailUsage(resolved);
   }
-  return JudgeRun(run, *answers, hulls, arguments).Run();
+  return JudgeRun(run, answers, hulls, arguments).Run();
 }
 
 }  // namespace

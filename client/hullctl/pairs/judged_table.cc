@@ -11,12 +11,11 @@
 #include <string_view>
 #include <utility>
 
+#include "client/base/status_macros.h"
 #include "client/formats/byte_source.h"
 #include "client/formats/text_number.h"
-#include "client/packed_placements.h"
 #include "client/pose/rigid_pose.h"
 #include "client/robot/joint_file.h"
-#include "client/status_macros.h"
 
 namespace hulld {
 namespace {
@@ -316,21 +315,10 @@ absl::StatusOr<std::vector<JudgedAnswer>> ReadJudgedTable(const std::string& pat
 }
 
 const char* FaultName(Fault fault) {
-  switch (fault) {
-    case Fault::kFalseContact:
-      return "false contact";
-    case Fault::kMiss:
-      return "miss";
-    case Fault::kTouching:
-      return "touching";
-    case Fault::kDistance:
-      return "distance";
-    case Fault::kDepth:
-      return "depth";
-    case Fault::kTime:
-      return "time";
-  }
-  return "";
+  // In the order of Fault.
+  static constexpr const char* kNames[] = {"false contact", "miss",  "touching",
+                                           "distance",      "depth", "time"};
+  return kNames[static_cast<size_t>(fault)];
 }
 
 Judgement Judge(const JudgedAnswer& answer, const AnswerRow& row, const Allowed& allowed) {

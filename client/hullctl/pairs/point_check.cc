@@ -40,11 +40,10 @@ class PointCheck {
         base_(RequestFor(hull, wanted)) {}
 
   ExitCode Run(ReadRequest file) {
-    const auto status = client_.GetStatus();
-    if (!status.ok()) return run_.Fail(status.status());
+    HULLD_ASSIGN_OR_FAIL(run_.Fail, const auto status, client_.GetStatus());
     file.options.points_per_block =
-        std::min({kPointsPerCall, status->limits().max_pairs_per_batch(),
-                  std::max<uint64_t>(status->limits().max_placements(), 2) - 1});
+        std::min({kPointsPerCall, status.limits().max_pairs_per_batch(),
+                  std::max<uint64_t>(status.limits().max_placements(), 2) - 1});
     const auto read = ReadPoints(file, [this](const PointChunk& block) { return Query(block); });
     bar_.Clear();
     if (!answered_.ok()) return run_.Fail(answered_);
@@ -146,9 +145,8 @@ ExitCode CheckPoints(const Invocation& run, const v1::Placement& hull, const std
   PointInput input;
   input.files = {file};
   uint64_t bytes = 0;
-  auto plan = PlanReads(input, &bytes);
-  if (!plan.ok()) return run.FailUsage(plan.status());
-  return PointCheck(run, hull, wanted).Run(std::move(plan->front()));
+  HULLD_ASSIGN_OR_FAIL(run.FailUsage, auto plan, PlanReads(input, &bytes));
+  return PointCheck(run, hull, wanted).Run(std::move(plan.front()));
 }
 
 }  // namespace hulld

@@ -1,5 +1,3 @@
-#include "client/hullctl/parts/cover_command.h"
-
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
@@ -7,13 +5,14 @@
 #include <memory>
 #include <utility>
 
+#include "client/base/status_macros.h"
 #include "client/enclosure/coverage.h"
 #include "client/formats/text_number.h"
+#include "client/hullctl/command_line/commands.h"
 #include "client/hullctl/printing/answer_text.h"
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/printing/progress_bar.h"
 #include "client/packed_placements.h"
-#include "client/status_macros.h"
 
 namespace hulld {
 namespace {
@@ -143,9 +142,8 @@ ExitCode AnswerCover(const Invocation& run, const CoverArguments& arguments) {
   std::vector<std::string> hulls = arguments.words;
   const std::string file = hulls.back();
   hulls.pop_back();
-  const auto mesh = ReadMesh(file);
-  if (!mesh.ok()) return run.FailUsage(mesh.status());
-  if (mesh->triangles.empty()) {
+  HULLD_ASSIGN_OR_FAIL(run.FailUsage, const auto mesh, ReadMesh(file));
+  if (mesh.triangles.empty()) {
     return run.FailUsage(file + ": contains no triangles");
   }
   const Client client = run.MakeClient();
@@ -154,18 +152,15 @@ ExitCode AnswerCover(const Invocation& run, const CoverArguments& arguments) {
     if (absl::Status added = fetcher.Add(hull); !added.ok()) return run.Fail(added);
   }
   const std::vector<CoveringPiece> pieces = fetcher.Take();
-  ProgressBar bar(run.err, run.shows_progress, "triangles", mesh->triangles.size());
-  auto coverage = CoverMesh(pieces, *mesh, [&bar](uint64_t done) { bar.Update(done); });
+  ProgressBar bar(run.err, run.shows_progress, "triangles", mesh.triangles.size());
+  auto coverage = CoverMesh(pieces, mesh, [&bar](uint64_t done) { bar.Update(done); });
   bar.Clear();
   if (!coverage.ok()) return run.Fail(coverage.status());
-  std::stable_sort(coverage->uncovered.begin(), coverage->uncovered.end(),
-                   [](const UncoveredTriangle& a, const UncoveredTriangle& b) {
-                     return a.distance > b.distance;
-                   });
+  std::ranges::stable_sort(coverage->uncovered, std::greater(), &UncoveredTriangle::distance);
   if (run.json()) {
-    PrintCoverageJson(run, *mesh, *coverage);
+    PrintCoverageJson(run, mesh, *coverage);
   } else {
-    PrintCoverage(run, arguments, *mesh, pieces.size(), *coverage);
+    PrintCoverage(run, arguments, mesh, pieces.size(), *coverage);
   }
   return ExitCode::kDone;
 }

@@ -2,12 +2,11 @@
 
 #include <absl/strings/str_cat.h>
 
-#include <algorithm>
-#include <memory>
 #include <optional>
 #include <set>
 #include <utility>
 
+#include "client/base/status_macros.h"
 #include "client/formats/text_number.h"
 #include "client/hullctl/body/hull_segment.h"
 #include "client/hullctl/parts/volume_comparison.h"
@@ -15,7 +14,6 @@
 #include "client/hullctl/printing/progress_bar.h"
 #include "client/hullctl/printing/table.h"
 #include "client/point_messages.h"
-#include "client/status_macros.h"
 
 namespace hulld {
 namespace {
@@ -118,17 +116,13 @@ ExitCode JoinParts(const Invocation& run, const Client& client, const v1::GetBod
     body = put->body();
   }
   const uint64_t added = body.piece_count() - static_cast<uint64_t>(found.pieces_size());
-  if (run.names()) {
-    run.out << id << "\n";
-  } else if (run.json()) {
-    run.out << JsonObject()
-                   .Add("bodyId", id)
-                   .Add("pieces", uint64_t{body.piece_count()})
-                   .Add("added", added)
-                   .Add("revision", uint64_t{body.revision()})
-                   .Close()
-            << "\n";
-  } else if (added == 0) {
+  JsonObject json;
+  json.Add("bodyId", id)
+      .Add("pieces", uint64_t{body.piece_count()})
+      .Add("added", added)
+      .Add("revision", uint64_t{body.revision()});
+  if (run.PrintForPrograms(json.Close(), id)) return ExitCode::kDone;
+  if (added == 0) {
     run.out << "body " << id << " already has all parts, at revision " << body.revision() << "\n";
   } else {
     run.out << "body " << id << (found.pieces().empty() ? " created" : " extended")
@@ -142,45 +136,39 @@ ExitCode JoinParts(const Invocation& run, const Client& client, const v1::GetBod
 
 ExitCode AppendParts(const Invocation& run, const std::string& body_id,
                      const std::vector<std::string>& files, SplitBy split, bool create) {
-  const auto parts = ReadAll(body_id, files, split);
-  if (!parts.ok()) return run.FailUsage(parts.status());
+  HULLD_ASSIGN_OR_FAIL(run.FailUsage, const auto parts, ReadAll(body_id, files, split));
   const Client client = run.MakeClient();
-  const auto body = FindBody(client, body_id, create);
-  if (!body.ok()) return run.Fail(body.status());
-  if (absl::Status fits = CheckPieces(client, *body, body_id, *parts); !fits.ok()) {
+  HULLD_ASSIGN_OR_FAIL(run.Fail, const auto body, FindBody(client, body_id, create));
+  if (absl::Status fits = CheckPieces(client, body, body_id, parts); !fits.ok()) {
     return run.Fail(fits);
   }
-  ProgressBar bar(run.err, run.shows_progress, "parts", parts->size());
+  ProgressBar bar(run.err, run.shows_progress, "parts", parts.size());
   Table table;
   table.Row({"HULL", "TRIANGLES", "POINTS", "VERTICES", "VOLUME OF THE HULL"});
-  for (const NamedPart& named : *parts) {
+  for (const NamedPart& named : parts) {
     const auto totals = Send(client, named, create);
     bar.Clear();
     if (!totals.ok()) {
-      run.err << "hullctl: " << &named - parts->data() << " of " << parts->size()
+      run.err << "hullctl: " << &named - parts.data() << " of " << parts.size()
               << " parts were appended before this error\n";
       return run.Fail(totals.status());
     }
-    const auto volumes =
-        CompareVolumes(client, named.hull_id, named.part.mesh.vertices.size(), named.part.mesh);
-    if (!volumes.ok()) return run.Fail(volumes.status());
-    WarnOfVolumeRatio(run, named.hull_id, volumes->ratio);
-    if (run.names()) {
-      run.out << named.hull_id << "\n";
-    } else if (run.json()) {
-      JsonObject object;
-      object.Add("hullId", named.hull_id)
-          .Add("triangles", uint64_t{named.part.mesh.triangles.size()})
-          .Add("vertices", totals->vertex_count);
-      if (volumes->ratio) object.AddJson("volumeRatio", absl::StrCat(*volumes->ratio));
-      run.out << object.Close() << "\n";
-    }
+    HULLD_ASSIGN_OR_FAIL(
+        run.Fail, const auto volumes,
+        CompareVolumes(client, named.hull_id, named.part.mesh.vertices.size(), named.part.mesh));
+    WarnOfVolumeRatio(run, named.hull_id, volumes.ratio);
+    JsonObject json;
+    json.Add("hullId", named.hull_id)
+        .Add("triangles", uint64_t{named.part.mesh.triangles.size()})
+        .Add("vertices", totals->vertex_count);
+    if (volumes.ratio) json.AddJson("volumeRatio", absl::StrCat(*volumes.ratio));
+    run.PrintForPrograms(json.Close(), named.hull_id);
     table.Row({named.hull_id, absl::StrCat(named.part.mesh.triangles.size()),
                absl::StrCat(named.part.mesh.vertices.size()), absl::StrCat(totals->vertex_count),
-               volumes->text.empty() ? "-" : volumes->text});
+               volumes.text.empty() ? "-" : volumes.text});
   }
   if (!run.names() && !run.json()) table.Print(run.out);
-  return JoinParts(run, client, *body, body_id, *parts);
+  return JoinParts(run, client, body, body_id, parts);
 }
 
 }  // namespace hulld

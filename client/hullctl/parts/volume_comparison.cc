@@ -3,8 +3,6 @@
 #include <absl/strings/str_format.h>
 #include <sys/stat.h>
 
-#include <utility>
-
 #include "client/enclosure/mesh_volume.h"
 
 namespace hulld {

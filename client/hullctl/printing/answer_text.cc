@@ -1,5 +1,7 @@
 #include "client/hullctl/printing/answer_text.h"
 
+#include <absl/strings/strip.h>
+
 #include <cstdio>
 
 #include "client/formats/text_number.h"
@@ -7,10 +9,6 @@
 
 namespace hulld {
 namespace {
-
-std::string WithoutPrefix(const std::string& name, const std::string& prefix) {
-  return name.rfind(prefix, 0) == 0 ? name.substr(prefix.size()) : name;
-}
 
 std::string IntegerText(const std::string& digits) {
   constexpr size_t kShown = 24;
@@ -22,7 +20,7 @@ std::string IntegerText(const std::string& digits) {
 
 std::string RelationText(v1::Relation relation) {
   if (relation == v1::RELATION_UNSPECIFIED) return "-";
-  return WithoutPrefix(v1::Relation_Name(relation), "RELATION_");
+  return std::string(absl::StripPrefix(v1::Relation_Name(relation), "RELATION_"));
 }
 
 std::string PaintedRelation(v1::Relation relation, const Painter& paint) {
@@ -41,7 +39,7 @@ std::string PaintedRelation(v1::Relation relation, const Painter& paint) {
 }
 
 std::string AxisKindText(v1::AxisKind kind) {
-  return WithoutPrefix(v1::AxisKind_Name(kind), "AXIS_KIND_");
+  return std::string(absl::StripPrefix(v1::AxisKind_Name(kind), "AXIS_KIND_"));
 }
 
 std::string RungText(v1::Rung rung) {
@@ -55,7 +53,7 @@ std::string RungText(v1::Rung rung) {
     case v1::RUNG_EXACT:
       return "exact arithmetic";
     default:
-      return WithoutPrefix(v1::Rung_Name(rung), "RUNG_");
+      return std::string(absl::StripPrefix(v1::Rung_Name(rung), "RUNG_"));
   }
 }
 

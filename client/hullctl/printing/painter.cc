@@ -5,25 +5,14 @@
 namespace hulld {
 namespace {
 
-const char* EscapeCode(Hue hue) {
-  switch (hue) {
-    case Hue::kHeading:
-      return "1";
-    case Hue::kGood:
-      return "32";
-    case Hue::kNotable:
-      return "33";
-    case Hue::kBad:
-      return "31";
-  }
-  return "0";
-}
+// The parameters of the escape sequences, in the order of Hue.
+constexpr const char* kCodes[] = {"1", "32", "33", "31"};
 
 }  // namespace
 
 std::string Painter::operator()(Hue hue, const std::string& text) const {
   if (!on_) return text;
-  return std::string("\x1b[") + EscapeCode(hue) + "m" + text + "\x1b[0m";
+  return std::string("\x1b[") + kCodes[static_cast<size_t>(hue)] + "m" + text + "\x1b[0m";
 }
 
 bool WantsColor(const std::string& when, bool is_terminal) {

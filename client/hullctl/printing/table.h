@@ -5,7 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "client/formats/text_number.h"
 #include "client/hullctl/printing/painter.h"
 
 namespace hulld {

@@ -6,14 +6,12 @@
 #include <memory>
 #include <numbers>
 #include <set>
-#include <utility>
 
+#include "client/hullctl/command_line/commands.h"
 #include "client/hullctl/command_line/interrupt.h"
-#include "client/hullctl/command_line/output_file.h"
 #include "client/hullctl/load/point_generator.h"
 #include "client/hullctl/printing/progress_bar.h"
 #include "client/hullctl/robot/check_scope.h"
-#include "client/hullctl/robot/robot_commands.h"
 #include "client/hullctl/robot/robot_model.h"
 #include "client/hullctl/robot/waypoint_stream.h"
 
@@ -81,8 +79,7 @@ std::vector<DisabledPair> Judge(const std::set<LinkPair>& adjacent,
     if (tally.colliding == 0) pairs.push_back({links, "Never"});
     if (tally.colliding == samples) pairs.push_back({links, "Always"});
   }
-  std::sort(pairs.begin(), pairs.end(),
-            [](const DisabledPair& a, const DisabledPair& b) { return a.links < b.links; });
+  std::ranges::sort(pairs, {}, &DisabledPair::links);
   return pairs;
 }
 
@@ -123,19 +120,18 @@ absl::Status Sample(const Invocation& run, const AcmArguments& arguments, const 
 }
 
 ExitCode MakeAcm(const Invocation& run, const AcmArguments& arguments) {
-  auto model = ReadRobot(arguments.robot);
-  if (!model.ok()) return run.FailUsage(model.status());
+  HULLD_ASSIGN_OR_FAIL(run.FailUsage, auto model, ReadRobot(arguments.robot));
   std::atomic<bool> stopped = false;
   const Interrupt interrupt([&stopped] { stopped = true; });
   const Client client = run.MakeClient();
-  absl::Status status = PrepareHulls(run, arguments.robot, client, &*model);
-  const std::set<LinkPair> adjacent = AdjacentPairs(model->robot);
-  std::set<LinkPair> left_out = LoosePairs(model->robot);
+  absl::Status status = PrepareHulls(run, arguments.robot, client, &model);
+  const std::set<LinkPair> adjacent = AdjacentPairs(model.robot);
+  std::set<LinkPair> left_out = LoosePairs(model.robot);
   left_out.insert(adjacent.begin(), adjacent.end());
-  const std::vector<uint32_t> pairs = model->PairsWithout(left_out);
+  const std::vector<uint32_t> pairs = model.PairsWithout(left_out);
   std::map<LinkPair, Tally> tallies;
   if (status.ok() && !pairs.empty()) {
-    status = Sample(run, arguments, *model, client, stopped, &tallies, pairs);
+    status = Sample(run, arguments, model, client, stopped, &tallies, pairs);
   }
   if (!status.ok()) {
     return absl::IsInvalidArgument(status) ? run.FailUsage(status) : run.Fail(status);
@@ -145,10 +141,8 @@ ExitCode MakeAcm(const Invocation& run, const AcmArguments& arguments) {
       "Adjacent: connected by a joint, or through links without shapes. Never, Always: in ",
       arguments.samples, " random configurations (seed ", arguments.seed,
       "), which is evidence, not proof.");
-  const absl::Status written = WriteOutput(arguments.file, run.out, [&](std::ostream& out) {
-    WriteSrdf(model->robot, disabled, comment, out);
-  });
-  return written.ok() ? ExitCode::kDone : run.FailUsage(written);
+  return run.WriteFile(arguments.file,
+                       [&](std::ostream& out) { WriteSrdf(model.robot, disabled, comment, out); });
 }
 
 }  // namespace

@@ -6,17 +6,17 @@
 #include <unordered_map>
 #include <utility>
 
+#include "client/base/status_macros.h"
 #include "client/formats/text_number.h"
 #include "client/hullctl/command_line/arguments.h"
+#include "client/hullctl/command_line/commands.h"
 #include "client/hullctl/command_line/interrupt.h"
 #include "client/hullctl/command_line/query_options.h"
 #include "client/hullctl/printing/answer_text.h"
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/printing/progress_bar.h"
-#include "client/hullctl/printing/table.h"
 #include "client/hullctl/robot/check_scope.h"
 #include "client/hullctl/robot/continuous_check.h"
-#include "client/hullctl/robot/robot_commands.h"
 #include "client/hullctl/robot/robot_model.h"
 #include "client/hullctl/robot/waypoint_source.h"
 #include "client/hullctl/robot/waypoint_stream.h"
@@ -24,7 +24,6 @@
 #include "client/hullctl/view/view_scene.h"
 #include "client/packed_placements.h"
 #include "client/robot/joint_file.h"
-#include "client/status_macros.h"
 
 namespace hulld {
 namespace {
@@ -479,9 +478,8 @@ ExitCode RobotCheck::Run() {
 }
 
 ExitCode CheckRobot(const Invocation& run, const RobotCheckArguments& arguments) {
-  auto model = ReadRobot(arguments.robot);
-  if (!model.ok()) return run.FailUsage(model.status());
-  return RobotCheck(run, arguments, *std::move(model)).Run();
+  HULLD_ASSIGN_OR_FAIL(run.FailUsage, auto model, ReadRobot(arguments.robot));
+  return RobotCheck(run, arguments, std::move(model)).Run();
 }
 
 // Adds options that select the pairs of links.

@@ -3,13 +3,12 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 
-#include <algorithm>
 #include <array>
 #include <cstdlib>
-#include <memory>
 #include <optional>
 #include <utility>
 
+#include "client/base/status_macros.h"
 #include "client/enclosure/mesh_volume.h"
 #include "client/formats/text_number.h"
 #include "client/hullctl/body/hull_segment.h"
@@ -19,7 +18,6 @@
 #include "client/point_messages.h"
 #include "client/robot/package_path.h"
 #include "client/robot/urdf_file.h"
-#include "client/status_macros.h"
 
 namespace hulld {
 
@@ -73,7 +71,7 @@ absl::Status AddLink(const RobotArguments& arguments, const PackagePaths& paths,
   for (const CollisionShape& shape : from.shapes) {
     auto pieces = ShapePieces(shape, paths, arguments.split);
     if (!pieces.ok()) {
-      const std::string message(pieces.status().message().data(), pieces.status().message().size());
+      const std::string message(pieces.status().message());
       return absl::Status(pieces.status().code(),
                           absl::StrCat(arguments.urdf, ":", shape.line, ": link ",
                                        Quoted(from.name), ": ", message));

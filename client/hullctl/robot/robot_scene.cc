@@ -8,8 +8,8 @@
 #include <numbers>
 #include <set>
 #include <utility>
-#include <vector>
 
+#include "client/base/status_macros.h"
 #include "client/formats/byte_source.h"
 #include "client/hullctl/body/hull_segment.h"
 #include "client/hullctl/robot/check_scope.h"
@@ -18,7 +18,6 @@
 #include "client/robot/joint_file.h"
 #include "client/robot/robot.h"
 #include "client/robot/srdf_file.h"
-#include "client/status_macros.h"
 
 namespace hulld {
 namespace {

@@ -6,11 +6,11 @@
 #include <cmath>
 #include <utility>
 
+#include "client/base/status_macros.h"
 #include "client/formats/text_number.h"
 #include "client/hullctl/command_line/arguments.h"
 #include "client/hullctl/help/suggestion.h"
 #include "client/packed_placements.h"
-#include "client/status_macros.h"
 
 namespace hulld {
 namespace {

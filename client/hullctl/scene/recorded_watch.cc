@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <string_view>
 
+#include "client/base/status_macros.h"
 #include "client/formats/byte_source.h"
 #include "client/formats/text_number.h"
 #include "client/hullctl/printing/json.h"
-#include "client/status_macros.h"
 #include "hulld/v1/collision.pb.h"
 #include "hulld/v1/hull.pb.h"
 

@@ -1,14 +1,12 @@
-#include "client/hullctl/scene/scene_commands.h"
-
 #include <absl/strings/str_cat.h>
 
 #include <memory>
 #include <vector>
 
 #include "client/formats/text_number.h"
+#include "client/hullctl/command_line/commands.h"
 #include "client/hullctl/command_line/deletion.h"
 #include "client/hullctl/printing/json.h"
-#include "client/hullctl/printing/table.h"
 #include "client/hullctl/scene/scene_sync.h"
 #include "client/hullctl/scene/yaml_scene.h"
 
@@ -42,6 +40,10 @@ constexpr char kYamlHelp[] =
     "'hullctl check': separation, witness, normal, axis, certificate, analysis, clearance,\n"
     "max_error, tolerance. `scale` converts coordinates of files to meters, rounded once.\n"
     "Relative file names start at the folder of the scene file.\n";
+
+std::string ChangeJson(const ServerObject& kept, const char* what) {
+  return JsonObject().Add(kept.is_body ? "bodyId" : "hullId", kept.id).Add("change", what).Close();
+}
 
 // If the item was listed, deletes only the listed revision.
 absl::StatusOr<v1::ResponseHeader> DeleteServerObject(const Client& client,
@@ -93,22 +95,18 @@ class SceneSync {
   ExitCode Run(bool changes, bool prune, bool yes) {
     std::vector<Change> hulls;
     for (const HullDefinition& hull : scene_.hulls) {
-      const auto xyz = PointsOf(hull);
-      if (!xyz.ok()) return run_.FailUsage(xyz.status());
-      const auto change = Compare(client_, hull.hull_id, *xyz);
-      if (!change.ok()) return run_.Fail(change.status());
-      hulls.push_back(*change);
+      HULLD_ASSIGN_OR_FAIL(run_.FailUsage, const auto xyz, PointsOf(hull));
+      HULLD_ASSIGN_OR_FAIL(run_.Fail, const auto change, Compare(client_, hull.hull_id, xyz));
+      hulls.push_back(change);
     }
     std::vector<Change> bodies;
     for (const BodyDefinition& body : scene_.bodies) {
-      const auto change = CompareBody(client_, body);
-      if (!change.ok()) return run_.Fail(change.status());
-      bodies.push_back(*change);
+      HULLD_ASSIGN_OR_FAIL(run_.Fail, const auto change, CompareBody(client_, body));
+      bodies.push_back(change);
     }
-    const auto unlisted = UnlistedObjects(client_, scene_);
-    if (!unlisted.ok()) return run_.Fail(unlisted.status());
+    HULLD_ASSIGN_OR_FAIL(run_.Fail, const auto unlisted, UnlistedObjects(client_, scene_));
     if (prune && changes && !yes) {
-      const absl::Status confirmed = Confirm(run_, *unlisted, "cancelled; nothing was changed");
+      const absl::Status confirmed = Confirm(run_, unlisted, "cancelled; nothing was changed");
       if (!confirmed.ok()) return run_.FailUsage(confirmed);
     }
     for (size_t i = 0; i < hulls.size(); ++i) {
@@ -125,7 +123,7 @@ class SceneSync {
                                       [&] { return client_.PutBody(BodyRequest(body)).status(); });
       if (!taken.ok()) return run_.Fail(taken);
     }
-    const absl::Status listed = HandleUnlisted(*unlisted, changes, prune);
+    const absl::Status listed = HandleUnlisted(unlisted, changes, prune);
     if (!listed.ok()) return run_.Fail(listed);
     if (!run_.json() && !run_.names()) {
       run_.out << "# " << Counted(same_hulls_, "hull");
@@ -170,15 +168,7 @@ class SceneSync {
 
   void PrintChange(const char* mark, const ServerObject& kept, const char* what) {
     ++differences_;
-    if (run_.json()) {
-      run_.out << JsonObject()
-                      .Add(kept.is_body ? "bodyId" : "hullId", kept.id)
-                      .Add("change", what)
-                      .Close()
-               << "\n";
-    } else if (run_.names()) {
-      run_.out << kept.id << "\n";
-    } else {
+    if (!run_.PrintForPrograms(ChangeJson(kept, what), kept.id)) {
       run_.out << mark << " " << kept.id << "\t" << (kept.is_body ? "body " : "") << what << "\n";
     }
     run_.out << std::flush;
@@ -193,21 +183,19 @@ class SceneSync {
 };
 
 ExitCode ApplyScene(const Invocation& run, const SyncArguments& arguments) {
-  const auto scene = ReadYamlScene(arguments.file);
-  if (!scene.ok()) return run.FailUsage(scene.status());
-  if (arguments.prune && !OwnsItsPrefix(*scene)) {
+  HULLD_ASSIGN_OR_FAIL(run.FailUsage, const auto scene, ReadYamlScene(arguments.file));
+  if (arguments.prune && !OwnsItsPrefix(scene)) {
     return run.FailUsage(absl::StrCat(arguments.file,
                                       ": --prune needs a prefix that ends in \"/\", such as ",
-                                      scene->prefix.empty() ? "cell-3" : scene->prefix,
+                                      scene.prefix.empty() ? "cell-3" : scene.prefix,
                                       "/; \"cell-3\" would also match cell-30/arm"));
   }
-  return SceneSync(run, *scene).Run(!arguments.dry_run, arguments.prune, arguments.yes);
+  return SceneSync(run, scene).Run(!arguments.dry_run, arguments.prune, arguments.yes);
 }
 
 ExitCode DiffScene(const Invocation& run, const SyncArguments& arguments) {
-  const auto scene = ReadYamlScene(arguments.file);
-  if (!scene.ok()) return run.FailUsage(scene.status());
-  SceneSync sync(run, *scene);
+  HULLD_ASSIGN_OR_FAIL(run.FailUsage, const auto scene, ReadYamlScene(arguments.file));
+  SceneSync sync(run, scene);
   const ExitCode code = sync.Run(/*changes=*/false, /*prune=*/false, /*yes=*/false);
   if (code != ExitCode::kDone) return code;
   return sync.found_differences() ? ExitCode::kRequestFailed : ExitCode::kDone;
@@ -234,32 +222,22 @@ absl::StatusOr<std::vector<ServerObject>> DefinedAndThere(const Client& client,
 }
 
 ExitCode DeleteScene(const Invocation& run, const SyncArguments& arguments) {
-  const auto scene = ReadYamlScene(arguments.file);
-  if (!scene.ok()) return run.FailUsage(scene.status());
+  HULLD_ASSIGN_OR_FAIL(run.FailUsage, const auto scene, ReadYamlScene(arguments.file));
   const Client client = run.MakeClient();
-  const auto targets = DefinedAndThere(client, *scene);
-  if (!targets.ok()) return run.Fail(targets.status());
-  if (targets->empty()) {
+  HULLD_ASSIGN_OR_FAIL(run.Fail, const auto targets, DefinedAndThere(client, scene));
+  if (targets.empty()) {
     if (!run.json() && !run.names()) run.out << "# none of the file's hulls and bodies exist\n";
     return ExitCode::kDone;
   }
-  if (!arguments.yes && targets->size() > 1) {
-    const absl::Status confirmed = Confirm(run, *targets, "nothing was deleted");
+  if (!arguments.yes && targets.size() > 1) {
+    const absl::Status confirmed = Confirm(run, targets, "nothing was deleted");
     if (!confirmed.ok()) return run.FailUsage(confirmed);
   }
-  for (const ServerObject& kept : *targets) {
+  for (const ServerObject& kept : targets) {
     const auto header = DeleteServerObject(client, kept);
     if (absl::IsNotFound(header.status())) continue;
     if (!header.ok()) return run.Fail(header.status());
-    if (run.json()) {
-      run.out << JsonObject()
-                     .Add(kept.is_body ? "bodyId" : "hullId", kept.id)
-                     .Add("change", "deleted")
-                     .Close()
-              << "\n";
-    } else if (run.names()) {
-      run.out << kept.id << "\n";
-    } else {
+    if (!run.PrintForPrograms(ChangeJson(kept, "deleted"), kept.id)) {
       run.out << kept.id << " deleted at revision " << header->revision() << "\n";
     }
   }

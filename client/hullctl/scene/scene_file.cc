@@ -9,11 +9,10 @@
 #include <algorithm>
 #include <cctype>
 #include <numeric>
-#include <set>
 #include <span>
 #include <string_view>
-#include <utility>
 
+#include "client/base/status_macros.h"
 #include "client/formats/text_number.h"
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/scene/yaml_scene.h"
@@ -156,10 +155,9 @@ absl::StatusOr<Scene> ParseScene(const std::string& text, const ObjectScanner& s
     TakeShared(&batch, &scene);
     scene.method = batch.method();
   } else {
-    const absl::Status s = ParseJson(text, UnknownFields::kRefuse, &scene.request);
-    if (!s.ok()) return s;
+    HULLD_RETURN_IF_ERROR(ParseJson(text, UnknownFields::kRefuse, &scene.request));
   }
-  if (absl::Status fits = CheckPacked(scene.request); !fits.ok()) return fits;
+  HULLD_RETURN_IF_ERROR(CheckPacked(scene.request));
   if (scene.pairs.has_value() && scene.pairs->size() % 2 != 0) {
     return absl::InvalidArgumentError(absl::StrCat("pairs has an odd number of indices, ",
                                                    scene.pairs->size(), "; each pair needs two"));
@@ -176,11 +174,10 @@ absl::StatusOr<Scene> ParseScene(const std::string& text, const ObjectScanner& s
 absl::StatusOr<Scene> ParseYaml(const ByteSource& source, uint64_t first_line,
                                 const std::string& text, BodyForm form) {
   // Preceding lines count in error positions.
-  const auto description = ParseYamlScene(
-      absl::StrCat(std::string(static_cast<size_t>(first_line - 1), '\n'), text, "\n"),
-      source.name());
-  if (!description.ok()) return description.status();
-  return ToScene(*description, source.name(), form);
+  const std::string padded =
+      absl::StrCat(std::string(static_cast<size_t>(first_line - 1), '\n'), text, "\n");
+  HULLD_ASSIGN_OR_RETURN(const auto description, ParseYamlScene(padded, source.name()));
+  return ToScene(description, source.name(), form);
 }
 
 // Reads an object: a scene in YAML, which includes JSON, or a request of the contract.
@@ -199,7 +196,7 @@ absl::StatusOr<Scene> ReadObject(ByteSource* source, std::string text, BodyForm 
   }
   absl::StatusOr<Scene> scene = ParseScene(text, scanner);
   if (scene.ok()) return scene;
-  const std::string message(scene.status().message().data(), scene.status().message().size());
+  const std::string message(scene.status().message());
   if (source->line() == first_line) return source->ErrorAtLine(message);
   return absl::InvalidArgumentError(absl::StrCat(source->name(), ": ", message));
 }
@@ -413,16 +410,14 @@ absl::StatusOr<std::vector<uint32_t>> PairsOf(const Scene& scene, const std::str
 
 absl::StatusOr<Scene> ReadWholeScene(const std::string& path, const std::string& command,
                                      BodyForm form) {
-  const auto source = ByteSource::Open(path);
-  if (!source.ok()) return source.status();
-  auto scene = ReadScene(source->get(), form);
-  if (!scene.ok()) return scene;
-  for (std::string_view line; (*source)->ReadLine(&line);) {
+  HULLD_ASSIGN_OR_RETURN(const auto source, ByteSource::Open(path));
+  HULLD_ASSIGN_OR_RETURN(auto scene, ReadScene(source.get(), form));
+  for (std::string_view line; source->ReadLine(&line);) {
     if (Trim(line).empty()) continue;
-    return (*source)->ErrorAtLine(absl::StrCat(
+    return source->ErrorAtLine(absl::StrCat(
         "'hullctl ", command, "' does not accept updates after the scene; use 'hullctl stream'"));
   }
-  if (!(*source)->status().ok()) return (*source)->status();
+  HULLD_RETURN_IF_ERROR(source->status());
   return scene;
 }
 

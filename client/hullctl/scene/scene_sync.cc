@@ -5,15 +5,13 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <cstdint>
 #include <set>
-#include <utility>
 
+#include "client/base/status_macros.h"
 #include "client/enclosure/convex_region.h"
 #include "client/formats/point_file.h"
 #include "client/hullctl/scene/yaml_scene.h"
 #include "client/packed_placements.h"
-#include "client/status_macros.h"
 
 namespace hulld {
 namespace {

@@ -6,14 +6,13 @@
 #include <yaml-cpp/eventhandler.h>
 
 #include <algorithm>
-#include <cmath>
 #include <exception>
 #include <set>
 #include <sstream>
 
+#include "client/base/status_macros.h"
 #include "client/formats/text_number.h"
 #include "client/hullctl/help/suggestion.h"
-#include "client/status_macros.h"
 
 namespace hulld {
 namespace {
@@ -147,16 +146,10 @@ absl::StatusOr<std::string> YamlReader::Text(const YAML::Node& node, const std::
 }
 
 absl::StatusOr<double> YamlReader::Number(const YAML::Node& node, const std::string& key) const {
-  double number = 0;
   if (!node.IsScalar()) return ErrorAt(node, absl::StrCat(key, " must be a number"));
-  const NumberText kind = ParseDouble(node.Scalar(), &number);
-  if (kind != NumberText::kNumber) {
-    return ErrorAt(node, absl::StrCat(key, ": ", NumberProblem(kind, node.Scalar())));
-  }
-  if (!std::isfinite(number)) {
-    return ErrorAt(node, absl::StrCat(key, ": ", Quoted(node.Scalar()), " is not a finite number"));
-  }
-  return number;
+  auto number = ParseFinite(node.Scalar());
+  if (number.ok()) return number;
+  return ErrorAt(node, absl::StrCat(key, ": ", number.status().message()));
 }
 
 absl::StatusOr<bool> YamlReader::Truth(const YAML::Node& node, const std::string& key) const {

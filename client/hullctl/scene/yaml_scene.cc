@@ -3,19 +3,18 @@
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
-#include <cmath>
-#include <functional>
 #include <map>
 #include <optional>
 #include <set>
 #include <utility>
 
+#include "client/base/status_macros.h"
 #include "client/formats/byte_source.h"
 #include "client/formats/text_number.h"
 #include "client/hullctl/help/suggestion.h"
 #include "client/hullctl/scene/yaml_reader.h"
 #include "client/packed_placements.h"
-#include "client/status_macros.h"
+#include "client/robot/shape_hull.h"
 
 namespace hulld {
 namespace {
@@ -134,12 +133,7 @@ class SceneParser {
     for (const double edge : size) {
       if (edge < 0) return yaml_.ErrorAt(node, "box edges must be at least 0");
     }
-    for (int corner = 0; corner < 8; ++corner) {
-      for (size_t axis = 0; axis < 3; ++axis) {
-        const double half = size[axis] / 2;
-        hull->xyz.push_back((corner >> axis) % 2 == 0 ? -half : half);
-      }
-    }
+    hull->xyz = BoxCorners(std::span(size).first<3>());
     return absl::OkStatus();
   }
 

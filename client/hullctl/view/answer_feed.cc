@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <utility>
 
+#include "client/base/status_macros.h"
 #include "client/formats/text_number.h"
 #include "client/hullctl/printing/answer_row.h"
 #include "client/hullctl/printing/json.h"
 #include "client/packed_placements.h"
-#include "client/status_macros.h"
 
 namespace hulld {
 namespace {
@@ -49,26 +49,27 @@ std::string PairJson(std::pair<uint32_t, uint32_t> pair) {
   return absl::StrCat("[", pair.first, ",", pair.second, "]");
 }
 
-std::string ProblemOfPair(const char* type, std::pair<uint32_t, uint32_t> pair, uint64_t update,
-                          const absl::Status& status) {
-  return JsonObject()
-      .Add("type", type)
-      .AddJson("update", std::to_string(update))
-      .AddJson("pair", PairJson(pair))
+// Begins a message about a pair.
+JsonObject PairMessage(const char* type, const ViewedPair& pair) {
+  JsonObject message;
+  message.Add("type", type)
+      .AddJson("update", std::to_string(pair.update))
+      .AddJson("pair", PairJson(pair.indices));
+  return message;
+}
+
+std::string ProblemOfPair(const char* type, const ViewedPair& pair, const absl::Status& status) {
+  return PairMessage(type, pair)
       .Add("problem", std::string_view(status.message().data(), status.message().size()))
       .Close();
 }
 
-std::string AnswerMessage(std::pair<uint32_t, uint32_t> pair, const ViewObject& a,
-                          const ViewObject& b, uint64_t update, bool rest,
-                          const v1::HullVersion& version_a, const v1::HullVersion& version_b,
-                          const AnswerRow& row, const std::string& tolerant_json = "") {
-  JsonObject message;
-  message.Add("type", "answer")
-      .AddJson("update", std::to_string(update))
-      .AddJson("rest", rest ? "true" : "false")
-      .AddJson("pair", PairJson(pair))
-      .AddJson("poses", PosesJson({a.pose, b.pose}))
+std::string AnswerMessage(const ViewedPair& pair, bool rest, const v1::HullVersion& version_a,
+                          const v1::HullVersion& version_b, const AnswerRow& row,
+                          const std::string& tolerant_json = "") {
+  JsonObject message = PairMessage("answer", pair);
+  message.AddJson("rest", rest ? "true" : "false")
+      .AddJson("poses", PosesJson({pair.a.pose, pair.b.pose}))
       .AddJson("hullA", MessageJson(version_a))
       .AddJson("hullB", MessageJson(version_b));
   AddRow(row, &message);
@@ -239,9 +240,7 @@ v1::CheckCollisionRequest PairRequest(const ViewObject& a, const ViewObject& b, 
   return request;
 }
 
-std::string PairAnswerJson(std::pair<uint32_t, uint32_t> pair, const ViewObject& a,
-                           const ViewObject& b, uint64_t update,
-                           const v1::CheckCollisionResponse& response,
+std::string PairAnswerJson(const ViewedPair& pair, const v1::CheckCollisionResponse& response,
                            const std::string& tolerant_json) {
   AnswerRow row;
   row.relation = response.relation();
@@ -255,7 +254,7 @@ std::string PairAnswerJson(std::pair<uint32_t, uint32_t> pair, const ViewObject&
   }
   if (response.has_separation()) row.separation = response.separation();
   if (response.has_witness()) row.witness = response.witness();
-  return AnswerMessage(pair, a, b, update, /*rest=*/true, response.hull_a(), response.hull_b(), row,
+  return AnswerMessage(pair, /*rest=*/true, response.hull_a(), response.hull_b(), row,
                        tolerant_json);
 }
 
@@ -269,10 +268,9 @@ std::optional<v1::CheckCollisionRequest> MotionRequest(const ViewObject& a, cons
   return request;
 }
 
-std::string MotionAnswerJson(std::pair<uint32_t, uint32_t> pair, const ViewObject& a,
-                             const ViewObject& b, uint64_t update,
+std::string MotionAnswerJson(const ViewedPair& pair,
                              const absl::StatusOr<v1::CheckCollisionResponse>& response) {
-  if (!response.ok()) return ProblemOfPair("motion", pair, update, response.status());
+  if (!response.ok()) return ProblemOfPair("motion", pair, response.status());
   std::vector<std::string> hulls;
   for (const v1::HullVersion* version : {&response->hull_a(), &response->hull_b()}) {
     // An inline shape has none.
@@ -286,11 +284,8 @@ std::string MotionAnswerJson(std::pair<uint32_t, uint32_t> pair, const ViewObjec
     certificates.push_back(MessageJson(one));
   }
   const auto start = [](const ViewObject& of) { return of.motion ? of.motion->start : of.pose; };
-  JsonObject message;
-  message.Add("type", "motion")
-      .AddJson("update", std::to_string(update))
-      .AddJson("pair", PairJson(pair))
-      .AddJson("poses", PosesJson({start(a), start(b)}))
+  JsonObject message = PairMessage("motion", pair);
+  message.AddJson("poses", PosesJson({start(pair.a), start(pair.b)}))
       .AddJson("hulls", JsonArray(hulls))
       .Add("relation", v1::Relation_Name(response->relation()))
       .AddJson("firstContact", MessageJson(response->first_contact()))
@@ -388,53 +383,48 @@ void AnswerFeed::Run(const std::stop_token& stop) {
 }
 
 bool AnswerFeed::AnswerPair(const Query& query) {
-  const auto& [a, b] = *query.pair;
-  if (query.objects[a].hull_id.empty() || query.objects[b].hull_id.empty()) return true;
-  const auto answer = query.rest ? RestingAnswer(query) : MovingAnswer(query);
+  const ViewedPair pair = query.Viewed();
+  if (pair.a.hull_id.empty() || pair.b.hull_id.empty()) return true;
+  const auto answer = query.rest ? RestingAnswer(query) : MovingAnswer(pair, query.certificate);
   if (answer.ok()) return page_->SendText(*answer);
   stream_.reset();
-  return page_->SendText(ProblemOfPair("answer", *query.pair, query.update, answer.status()));
+  return page_->SendText(ProblemOfPair("answer", pair, answer.status()));
 }
 
 absl::StatusOr<std::string> AnswerFeed::RestingAnswer(const Query& query) const {
-  const ViewObject& a = query.objects[query.pair->first];
-  const ViewObject& b = query.objects[query.pair->second];
+  const ViewedPair pair = query.Viewed();
   HULLD_ASSIGN_OR_RETURN(const auto response,
-                         client_.CheckCollision(PairRequest(a, b, query.certificate)));
-  if (query.tolerance == 0) {
-    return PairAnswerJson(*query.pair, a, b, query.update, response);
-  }
-  HULLD_ASSIGN_OR_RETURN(const auto tolerant, TolerantAnswer(query));
-  return PairAnswerJson(*query.pair, a, b, query.update, response, tolerant);
+                         client_.CheckCollision(PairRequest(pair.a, pair.b, query.certificate)));
+  if (query.tolerance == 0) return PairAnswerJson(pair, response);
+  HULLD_ASSIGN_OR_RETURN(const auto tolerant, TolerantAnswer(pair, query.tolerance));
+  return PairAnswerJson(pair, response, tolerant);
 }
 
-absl::StatusOr<std::string> AnswerFeed::TolerantAnswer(const Query& query) const {
-  v1::CheckCollisionRequest request =
-      PairRequest(query.objects[query.pair->first], query.objects[query.pair->second],
-                  /*certificate=*/false);
+absl::StatusOr<std::string> AnswerFeed::TolerantAnswer(const ViewedPair& pair,
+                                                       double tolerance) const {
+  v1::CheckCollisionRequest request = PairRequest(pair.a, pair.b, /*certificate=*/false);
   // A tolerance excludes wanted fields.
   request.clear_wanted();
-  request.set_tolerance(query.tolerance);
+  request.set_tolerance(tolerance);
   HULLD_ASSIGN_OR_RETURN(const auto response, client_.CheckCollision(request));
   return JsonObject()
-      .AddJson("tolerance", ShortestText(query.tolerance))
+      .AddJson("tolerance", ShortestText(tolerance))
       .Add("relation", v1::Relation_Name(response.relation()))
       .Add("rung", v1::Rung_Name(response.rung()))
       .Close();
 }
 
-absl::StatusOr<std::string> AnswerFeed::MovingAnswer(const Query& query) {
-  const ViewObject& a = query.objects[query.pair->first];
-  const ViewObject& b = query.objects[query.pair->second];
+absl::StatusOr<std::string> AnswerFeed::MovingAnswer(const ViewedPair& pair, bool certificate) {
+  const ViewObject& a = pair.a;
+  const ViewObject& b = pair.b;
   const std::pair<std::string, std::string> hulls(a.hull_id, b.hull_id);
   absl::StatusOr<v1::StreamCollisionsResponse> response;
-  if (stream_ == nullptr || hulls != streamed_hulls_ ||
-      query.certificate != streamed_certificate_) {
+  if (stream_ == nullptr || hulls != streamed_hulls_ || certificate != streamed_certificate_) {
     stream_ = client_.OpenCollisionStream();
     streamed_hulls_ = hulls;
-    streamed_certificate_ = query.certificate;
+    streamed_certificate_ = certificate;
     v1::CollisionStreamOpen open;
-    const v1::CheckCollisionRequest request = PairRequest(a, b, query.certificate);
+    const v1::CheckCollisionRequest request = PairRequest(a, b, certificate);
     *open.add_placements() = request.a();
     *open.add_placements() = request.b();
     open.add_pairs(0);
@@ -466,8 +456,8 @@ absl::StatusOr<std::string> AnswerFeed::MovingAnswer(const Query& query) {
   if (columns.pair_problems_size() > 0) {
     return absl::InternalError(columns.pair_problems(0).message());
   }
-  return AnswerMessage(*query.pair, a, b, query.update, /*rest=*/false, streamed_version_a_,
-                       streamed_version_b_, RowAt(columns, 0));
+  return AnswerMessage(pair, /*rest=*/false, streamed_version_a_, streamed_version_b_,
+                       RowAt(columns, 0));
 }
 
 bool AnswerFeed::AnswerMotion(const Query& query) {
@@ -475,16 +465,14 @@ bool AnswerFeed::AnswerMotion(const Query& query) {
     queried_motion_.clear();
     return true;
   }
-  const ViewObject& a = query.objects[query.pair->first];
-  const ViewObject& b = query.objects[query.pair->second];
-  const auto request = MotionRequest(a, b, query.certificate);
+  const ViewedPair pair = query.Viewed();
+  const auto request = MotionRequest(pair.a, pair.b, query.certificate);
   std::string motion =
       request ? absl::StrCat(PairJson(*query.pair), request->SerializeAsString()) : "";
   const bool is_known = motion == queried_motion_ && !query.motion_is_stale;
   queried_motion_ = std::move(motion);
   if (!request || is_known) return true;
-  return page_->SendText(
-      MotionAnswerJson(*query.pair, a, b, query.update, client_.CheckCollision(*request)));
+  return page_->SendText(MotionAnswerJson(pair, client_.CheckCollision(*request)));
 }
 
 bool AnswerFeed::AnswerScene(const Query& query) const {

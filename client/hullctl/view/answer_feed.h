@@ -8,6 +8,7 @@
 #include <stop_token>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "client/client.h"
@@ -16,6 +17,14 @@
 #include "client/hullctl/view/view_scene.h"
 
 namespace hulld {
+
+// A pair of a scene's objects, by index, and the number of the page's update that it belongs to.
+struct ViewedPair {
+  std::pair<uint32_t, uint32_t> indices;
+  const ViewObject& a;
+  const ViewObject& b;
+  uint64_t update = 0;
+};
 
 // Answers the queries of a page on its own thread. Queries that arrive while one is in flight are
 // merged, and the latest poses win, because the pointer moves faster than answers arrive.
@@ -36,6 +45,11 @@ class AnswerFeed {
  private:
   // The complete query.
   struct Query {
+    // Requires a pair.
+    ViewedPair Viewed() const {
+      return {*pair, objects[pair->first], objects[pair->second], update};
+    }
+
     std::vector<ViewObject> objects;
     v1::FindCollisionsRequest rules;
     std::optional<std::vector<uint32_t>> pairs;
@@ -51,10 +65,10 @@ class AnswerFeed {
   void Run(const std::stop_token& stop);
   // Sends the answer about the pair. Returns false if the page has closed.
   bool AnswerPair(const Query& query);
-  absl::StatusOr<std::string> MovingAnswer(const Query& query);
+  absl::StatusOr<std::string> MovingAnswer(const ViewedPair& pair, bool certificate);
   absl::StatusOr<std::string> RestingAnswer(const Query& query) const;
   // Returns the pair's answer with the tolerance, as JSON.
-  absl::StatusOr<std::string> TolerantAnswer(const Query& query) const;
+  absl::StatusOr<std::string> TolerantAnswer(const ViewedPair& pair, double tolerance) const;
   // Sends the first contact of the pair, if it moves, unless the page has it.
   bool AnswerMotion(const Query& query);
   bool AnswerScene(const Query& query) const;
@@ -84,9 +98,7 @@ class AnswerFeed {
 
 // Returns all data shown about a pair, from one query; tolerant_json: its member `tolerant`
 // (protocol.h), or empty.
-std::string PairAnswerJson(std::pair<uint32_t, uint32_t> pair, const ViewObject& a,
-                           const ViewObject& b, uint64_t update,
-                           const v1::CheckCollisionResponse& response,
+std::string PairAnswerJson(const ViewedPair& pair, const v1::CheckCollisionResponse& response,
                            const std::string& tolerant_json = "");
 
 // Returns the request for that answer, with or without a proof.
@@ -98,8 +110,7 @@ std::optional<v1::CheckCollisionRequest> MotionRequest(const ViewObject& a, cons
                                                        bool certificate);
 
 // Returns the message `motion` for its response or error.
-std::string MotionAnswerJson(std::pair<uint32_t, uint32_t> pair, const ViewObject& a,
-                             const ViewObject& b, uint64_t update,
+std::string MotionAnswerJson(const ViewedPair& pair,
                              const absl::StatusOr<v1::CheckCollisionResponse>& response);
 
 // Returns the message `collisions` for a scene; rules, pairs: as in ViewScene.

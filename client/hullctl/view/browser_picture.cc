@@ -16,6 +16,9 @@
 #include <iterator>
 #include <vector>
 
+#include "client/base/status_macros.h"
+#include "client/hullctl/local/local_server.h"
+
 extern char** environ;
 
 namespace hulld {
@@ -27,16 +30,6 @@ constexpr const char* kBrowsers[] = {"chromium", "chromium-browser", "google-chr
                                      "google-chrome-stable", "microsoft-edge"};
 constexpr uint32_t kMinSide = 64;
 constexpr uint32_t kMaxSide = 16384;
-
-// Returns an absolute path, or empty.
-std::string FindProgram(const std::string& name) {
-  const char* const path = getenv("PATH");
-  for (const auto folder : absl::StrSplit(path == nullptr ? "" : path, ':', absl::SkipEmpty())) {
-    const fs::path program = fs::path(std::string(folder.data(), folder.size())) / name;
-    if (access(program.c_str(), X_OK) == 0) return program;
-  }
-  return "";
-}
 
 absl::StatusOr<std::string> FindBrowser() {
   if (const char* const chosen = getenv("HULLCTL_BROWSER"); chosen != nullptr) {
@@ -125,8 +118,7 @@ absl::StatusOr<PictureSize> ParsePictureSize(const std::string& text) {
 }
 
 absl::StatusOr<std::string> PictureOf(const std::string& picture_page) {
-  const auto browser = FindBrowser();
-  if (!browser.ok()) return browser.status();
+  HULLD_ASSIGN_OR_RETURN(const auto browser, FindBrowser());
   const TemporaryFolder folder;
   const fs::path page = folder.path() / "page.html";
   const fs::path shown = folder.path() / "shown.html";
@@ -136,7 +128,7 @@ absl::StatusOr<std::string> PictureOf(const std::string& picture_page) {
         absl::StrCat("cannot write to ", fs::temp_directory_path().string()));
   }
   std::vector<std::string> arguments = {
-      *browser, "--headless=new", "--no-first-run", "--mute-audio",
+      browser, "--headless=new", "--no-first-run", "--mute-audio",
       // For machines without a GPU.
       "--enable-unsafe-swiftshader", "--disable-dev-shm-usage",
       // The page draws when loaded; its virtual clock then runs to the end.
@@ -157,7 +149,7 @@ absl::StatusOr<std::string> PictureOf(const std::string& picture_page) {
     return picture;
   }
   return absl::InternalError(absl::StrCat(
-      *browser, " produced no picture: ", started ? LastLine(log) : "it could not be started"));
+      browser, " produced no picture: ", started ? LastLine(log) : "it could not be started"));
 }
 
 }  // namespace hulld

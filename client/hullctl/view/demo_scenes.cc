@@ -5,7 +5,6 @@
 #include <chrono>
 #include <utility>
 
-#include "client/hullctl/command_line/point_input.h"
 #include "client/hullctl/load/point_generator.h"
 
 namespace hulld {
@@ -20,21 +19,13 @@ constexpr double kGrownRadius = 6;
 
 RigidPose MovedBy(double x, double y, double z) { return {1, 0, 0, 0, x, y, z}; }
 
-v1::PointBlock Cloud(const CloudOptions& cloud) {
-  v1::PointBlock points;
-  GenerateCloud(cloud, [&points](const std::array<double, 3>& p) {
-    points.mutable_xyz()->Add(p.begin(), p.end());
-  });
-  return points;
-}
-
 // Returns points in balls of increasing radius, so that the hull grows on all sides.
 v1::PointBlock GrowthOf(int step) {
   CloudOptions cloud;
   cloud.count = kGrowthPoints;
   cloud.seed = static_cast<uint64_t>(step);
   cloud.radius = kGrownRadius * step / kGrowthSteps;
-  return Cloud(cloud);
+  return CloudPoints(cloud);
 }
 
 absl::Status SendGrowth(const Client::PointSink& sink) { return sink(GrowthOf(1)); }
@@ -79,8 +70,8 @@ class Workshop {
     return std::make_shared<FileShape>(shape.ok() ? *std::move(shape) : FileShape());
   }
   std::string Hull(const std::string& name, const CloudOptions& cloud) {
-    return Take(
-        hulls_->Add(name, [&cloud](const Client::PointSink& sink) { return sink(Cloud(cloud)); }));
+    return Take(hulls_->Add(
+        name, [&cloud](const Client::PointSink& sink) { return sink(CloudPoints(cloud)); }));
   }
   std::string Sprout(const std::string& name) { return Take(hulls_->Add(name, SendGrowth)); }
   RigidPose TurnedCopy(const std::string& hull_id, double shift) {

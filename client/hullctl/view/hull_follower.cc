@@ -88,18 +88,15 @@ void HullFollower::Take(const v1::WatchHullsResponse& response) {
   }
   if (response.synced() && !synced_) {
     synced_ = true;
-    for (auto id = present_.begin(); id != present_.end();) {
-      if (seen_since_restart_.contains(*id)) {
-        ++id;
-        continue;
-      }
+    std::erase_if(present_, [&](const std::string& id) {
+      if (seen_since_restart_.contains(id)) return false;
       v1::HullEvent gone;
       gone.set_kind(v1::HULL_EVENT_KIND_DELETED);
-      gone.mutable_hull()->set_hull_id(*id);
+      gone.mutable_hull()->set_hull_id(id);
       gone.mutable_hull()->set_revision(response.header().revision());
       receive_(gone, synced_);
-      id = present_.erase(id);
-    }
+      return true;
+    });
     seen_since_restart_.clear();
   }
   request_.set_after_revision(response.header().revision());

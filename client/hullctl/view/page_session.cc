@@ -94,9 +94,7 @@ void PageSession::MoveJoints(const ViewConfiguration& configuration) {
 }
 
 void PageSession::Show(const std::string& key) {
-  const auto scene =
-      std::find_if(program_.scenes.begin(), program_.scenes.end(),
-                   [&key](const ViewScene& candidate) { return candidate.key == key; });
+  const auto scene = std::ranges::find(program_.scenes, key, &ViewScene::key);
   if (scene == program_.scenes.end()) {
     page_->SendText(ProblemMessage(absl::StrCat("There is no scene \"", key, "\".")));
     return;

@@ -5,9 +5,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <cstring>
 #include <limits>
-#include <span>
 
 #include "client/formats/text_number.h"
 #include "client/hullctl/printing/json.h"

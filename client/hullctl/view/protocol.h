@@ -4,7 +4,6 @@
 #include <absl/status/statusor.h>
 #include <google/protobuf/struct.pb.h>
 
-#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>

@@ -4,15 +4,14 @@
 
 #include <algorithm>
 #include <set>
-#include <string>
 #include <vector>
 
+#include "client/base/status_macros.h"
 #include "client/formats/text_number.h"
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/view/answer_feed.h"
 #include "client/hullctl/view/geometry_feed.h"
 #include "client/hullctl/view/protocol.h"
-#include "client/status_macros.h"
 
 namespace hulld {
 namespace {
@@ -60,7 +59,7 @@ absl::StatusOr<std::string> AllPairs(const Client& client, const std::vector<Vie
         return PairRequest(objects[a], objects[b], certificate);
       };
       HULLD_ASSIGN_OR_RETURN(const auto response, Proven(client, request_with));
-      answers.push_back(PairAnswerJson({a, b}, objects[a], objects[b], 0, response));
+      answers.push_back(PairAnswerJson({{a, b}, objects[a], objects[b]}, response));
     }
   }
   return JsonArray(answers);
@@ -77,7 +76,7 @@ std::string AllMotions(const Client& client, const std::vector<ViewObject>& obje
       const auto response = Proven(client, [&](bool certificate) {
         return *MotionRequest(objects[a], objects[b], certificate);
       });
-      motions.push_back(MotionAnswerJson({a, b}, objects[a], objects[b], 0, response));
+      motions.push_back(MotionAnswerJson({{a, b}, objects[a], objects[b]}, response));
       if (!response.ok() || !response->first_contact().has_contact_time()) continue;
       times->insert(response->first_contact().separated_until());
       times->insert(response->first_contact().contact_time());

@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "client/base/status_macros.h"
 #include "client/formats/point_file.h"
 #include "client/hullctl/body/hull_segment.h"
 #include "client/hullctl/command_line/point_input.h"
 #include "client/hullctl/view/bridge/random_name.h"
-#include "client/status_macros.h"
 
 namespace hulld {
 namespace {

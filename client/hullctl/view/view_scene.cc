@@ -8,13 +8,13 @@
 #include <unordered_set>
 #include <utility>
 
+#include "client/base/status_macros.h"
 #include "client/formats/byte_source.h"
 #include "client/formats/point_file.h"
 #include "client/formats/text_number.h"
 #include "client/hullctl/local/file_shape.h"
 #include "client/hullctl/scene/scene_file.h"
 #include "client/packed_placements.h"
-#include "client/status_macros.h"
 
 namespace hulld {
 namespace {
@@ -42,17 +42,15 @@ absl::Status ReadPointShape(const std::string& path, PointFormat format, FileSha
     shape->xyz.resize(half);
     step *= 2;
   };
-  return ReadPoints(request,
-                    [&](const PointChunk& block) {
-                      for (size_t i = 0; i < block.xyz.size(); i += 3) {
-                        keep(block.xyz[i], block.xyz[i + 1], block.xyz[i + 2]);
-                      }
-                      for (size_t i = 0; i < block.xyz_float.size(); i += 3) {
-                        keep(block.xyz_float[i], block.xyz_float[i + 1], block.xyz_float[i + 2]);
-                      }
-                      return absl::OkStatus();
-                    })
-      .status();
+  const auto keep_all = [&keep](const auto& xyz) {
+    for (size_t i = 0; i < xyz.size(); i += 3) keep(xyz[i], xyz[i + 1], xyz[i + 2]);
+  };
+  const auto receive = [&](const PointChunk& block) {
+    keep_all(block.xyz);
+    keep_all(block.xyz_float);
+    return absl::OkStatus();
+  };
+  return ReadPoints(request, receive).status();
 }
 
 }  // namespace
@@ -97,9 +95,7 @@ bool IsFile(const std::string& argument) {
 }
 
 bool IsSceneFile(const std::string& path) {
-  for (const char* extension : {".json", ".yaml", ".yml"}) {
-    if (path.ends_with(extension)) return true;
-  }
+  if (path.ends_with(".json") || path.ends_with(".yaml") || path.ends_with(".yml")) return true;
   const auto format = PointFormatOfPath(path);
   std::error_code ignored;
   if (format.value_or(PointFormat::kXyz) != PointFormat::kXyz ||

@@ -18,7 +18,6 @@
 #include <utility>
 #include <vector>
 
-#include "client/hullctl/view/bridge/page_files.h"
 #include "client/hullctl/view/bridge/page_html.h"
 #include "client/hullctl/view/bridge/random_name.h"
 #include "client/hullctl/view/bridge/session_guard.h"

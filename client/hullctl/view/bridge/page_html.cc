@@ -5,10 +5,7 @@
 #include <absl/strings/str_replace.h>
 #include <zlib.h>
 
-#include <vector>
-
 #include "client/hullctl/printing/json.h"
-#include "client/hullctl/view/bridge/page_files.h"
 
 namespace hulld {
 namespace {

@@ -1,6 +1,5 @@
 #include "client/hullctl/view/bridge/session_guard.h"
 
-#include <absl/strings/escaping.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_split.h>
 #include <absl/strings/strip.h>
@@ -8,8 +7,8 @@
 
 #include <utility>
 
+#include "client/base/status_macros.h"
 #include "client/hullctl/view/bridge/random_name.h"
-#include "client/status_macros.h"
 
 namespace hulld {
 namespace {

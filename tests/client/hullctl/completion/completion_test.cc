@@ -3,7 +3,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "client/hullctl/completion/completion_script.h"
 #include "tests/client/hullctl/hullctl_on_server.h"
 
 namespace hulld {

@@ -36,7 +36,7 @@ TEST(AnswerFeed, TheFirstContactOfAMotionMayBeAbsent) {
   ViewObject ball{"ball", "", -1, {1, 0, 0, 0, 2, 0, 0}};
   ball.motion = {{1, 0, 0, 0, 3, 0, 0}, {0, 1, 0, 0, 1, 0, 0}};
   const auto message = [&](const absl::StatusOr<v1::CheckCollisionResponse>& response) {
-    return MotionAnswerJson({0, 1}, wall, ball, 7, response);
+    return MotionAnswerJson({{0, 1}, wall, ball, 7}, response);
   };
   v1::CheckCollisionResponse response;
   response.mutable_hull_a()->set_hull_id("cube");
@@ -64,7 +64,7 @@ TEST(AnswerFeed, TheProofOfAMotionIsForwarded) {
   v1::PieceCertificate* const piece = response.add_piece_certificates();
   piece->set_piece_b(4);
   response.add_piece_hulls()->set_hull_id("leg");
-  const std::string message = MotionAnswerJson({0, 1}, {}, {}, 7, response);
+  const std::string message = MotionAnswerJson({{0, 1}, {}, {}, 7}, response);
   EXPECT_THAT(message, HasSubstr(R"("intervals":[{"until":0.5}])"));
   EXPECT_THAT(message, HasSubstr(R"("certificate":{"direction":{"x":3,"y":0,"z":0},"pairs":[]})"));
   EXPECT_THAT(message, HasSubstr(R"("pieceCertificates":[{"pieceA":0,"pieceB":4)"));

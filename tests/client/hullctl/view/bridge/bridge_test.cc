@@ -13,7 +13,6 @@
 #include <string>
 #include <vector>
 
-#include "client/hullctl/view/bridge/page_files.h"
 #include "client/hullctl/view/bridge/page_html.h"
 
 namespace hulld {

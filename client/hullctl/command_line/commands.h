@@ -1,10 +1,8 @@
-#ifndef HULLD_CLIENT_HULLCTL_COMMANDS_COMMANDS_H_
-#define HULLD_CLIENT_HULLCTL_COMMANDS_COMMANDS_H_
+#ifndef HULLD_CLIENT_HULLCTL_COMMAND_LINE_COMMANDS_H_
+#define HULLD_CLIENT_HULLCTL_COMMAND_LINE_COMMANDS_H_
 
 #include "client/hullctl/command_line/command.h"
 #include "client/hullctl/command_line/invocation.h"
-#include "client/hullctl/command_line/query_options.h"
-#include "client/hullctl/scene/scene_file.h"
 
 namespace hulld {
 
@@ -21,6 +19,10 @@ void AddViewCommand(Command program, Invocation* invocation);
 void AddCheckCommand(Command program, Invocation* invocation);
 void AddCastCommand(Command program, Invocation* invocation);
 void AddBatchCommand(Command program, Invocation* invocation);
+void AddBodyCommand(Command program, Invocation* invocation);
+void AddCoverCommand(Command program, Invocation* invocation);
+void AddJudgeCommand(Command program, Invocation* invocation);
+void AddRobotCommand(Command program, Invocation* invocation);
 void AddSceneCommand(Command program, Invocation* invocation);
 void AddStreamCommand(Command program, Invocation* invocation);
 void AddVerifyCommand(Command program, Invocation* invocation);
@@ -36,12 +38,11 @@ void AddGenerateCommand(Command program, Invocation* invocation);
 // Hidden: writes man pages, for the build.
 void AddManCommand(Command program, Invocation* invocation);
 
-// Queries the pairs of a scene read from `file`, as 'hullctl batch' does.
-ExitCode AnswerPairs(const Invocation& run, const std::string& file, const Scene& scene,
-                     const QueryDetails& details, bool colliding);
-// Returns the form of bodies in queries. Certificates and the textbook's test apply to hulls only.
-BodyForm FormFor(const QueryDetails& details);
+// Likewise, declare commands of `robot`, and `scene apply`, `scene diff`, and `scene delete`.
+void AddRobotCheckCommand(Command robot, Invocation* invocation);
+void AddRobotAcmCommand(Command robot, Invocation* invocation);
+void AddSceneSyncCommands(Command scene, Invocation* invocation);
 
 }  // namespace hulld
 
-#endif  // HULLD_CLIENT_HULLCTL_COMMANDS_COMMANDS_H_
+#endif  // HULLD_CLIENT_HULLCTL_COMMAND_LINE_COMMANDS_H_

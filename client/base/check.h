@@ -1,5 +1,5 @@
-#ifndef HULLD_CLIENT_CHECK_H_
-#define HULLD_CLIENT_CHECK_H_
+#ifndef HULLD_CLIENT_BASE_CHECK_H_
+#define HULLD_CLIENT_BASE_CHECK_H_
 
 #include <cstdio>
 #include <cstdlib>
@@ -21,4 +21,4 @@ namespace hulld {
 #define HULLD_CLIENT_CHECK(condition) \
   ((condition) ? (void)0 : ::hulld::ClientCheckFailed(__FILE__, __LINE__, #condition))
 
-#endif  // HULLD_CLIENT_CHECK_H_
+#endif  // HULLD_CLIENT_BASE_CHECK_H_

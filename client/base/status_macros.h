@@ -1,5 +1,5 @@
-#ifndef HULLD_CLIENT_STATUS_MACROS_H_
-#define HULLD_CLIENT_STATUS_MACROS_H_
+#ifndef HULLD_CLIENT_BASE_STATUS_MACROS_H_
+#define HULLD_CLIENT_BASE_STATUS_MACROS_H_
 
 #include <absl/status/status.h>
 
@@ -25,4 +25,4 @@
 #define HULLD_LINE_NAME(line) HULLD_LINE_NAME_OF(line)
 #define HULLD_LINE_NAME_OF(line) result_of_line_##line
 
-#endif  // HULLD_CLIENT_STATUS_MACROS_H_
+#endif  // HULLD_CLIENT_BASE_STATUS_MACROS_H_
