@@ -17,6 +17,9 @@ namespace {
 
 // The server splits replies at about 1 MiB. Bounds the memory that a faulty server can claim.
 constexpr int kMaxReceiveBytes = 64 << 20;
+// Keepalive interval and timeout: those of the server.
+constexpr int kKeepaliveTimeMs = 60'000;
+constexpr int kKeepaliveTimeoutMs = 20'000;
 
 std::shared_ptr<grpc::Channel> Connect(const ClientOptions& options) {
   grpc::ChannelArguments arguments;
@@ -28,10 +31,21 @@ std::shared_ptr<grpc::Channel> Connect(const ClientOptions& options) {
   // Timeout of a connection attempt, TLS handshake included.
   arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, 5000);
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 500);
+  // Detects a server that vanished silently, for which a watch would otherwise wait forever.
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveTimeMs);
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveTimeoutMs);
+  arguments.SetInt(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
   if (options.own_connection) arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
   // By default gRPC uses the environment's proxy even for services on this machine.
   if (IsLoopback(options.server)) arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
   return OpenChannel(options.server, options.security, arguments);
+}
+
+// A longer timeout would overflow the clocks.
+ClientOptions WithFiniteTimeout(ClientOptions options) {
+  constexpr auto kLongest = std::chrono::hours(24 * 365);
+  options.timeout = std::min<std::chrono::milliseconds>(options.timeout, kLongest);
+  return options;
 }
 
 absl::Status AddPart(const v1::GetHullMeshResponse& part, HullMesh* mesh) {
@@ -129,7 +143,7 @@ HealthStatus DecodeHealth(const grpc::ByteBuffer& buffer) {
 Client::Client(ClientOptions options) : Client(options, Connect(options)) {}
 
 Client::Client(ClientOptions options, std::shared_ptr<grpc::Channel> channel)
-    : options_(std::move(options)),
+    : options_(WithFiniteTimeout(std::move(options))),
       channel_(std::move(channel)),
       hulls_(v1::HullService::NewStub(channel_)),
       collisions_(v1::CollisionService::NewStub(channel_)),
@@ -159,11 +173,6 @@ absl::StatusOr<Response> Client::Call(Stub* stub,
     context.set_deadline(options_.retry.ForCall(deadline));
     response.Clear();
     const grpc::Status status = (stub->*method)(&context, request, &response);
-    // This client does not cancel the call. gRPC reports CANCELLED when a call reaches a server
-    // during its shutdown.
-    if (status.error_code() == grpc::StatusCode::CANCELLED) {
-      return absl::UnavailableError("the server ended the call because it is shutting down");
-    }
     return FromGrpcStatus(status, context);
   };
   HULLD_RETURN_IF_ERROR(retry ? CallWithRetries(options_.retry, deadline, attempt) : attempt());

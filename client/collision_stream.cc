@@ -66,14 +66,24 @@ absl::StatusOr<v1::StreamCollisionsResponse> CollisionStream::Exchange() {
       changed_.wait_for(lock, timeout_, [this] { return (answered_ && written_) || reads_ended_; });
   if (in_time && answered_) return std::move(answer_);
   lock.unlock();
-  if (in_time) return Ended();
-  context_.TryCancel();
-  static_cast<void>(WaitUntilDone());
-  return absl::DeadlineExceededError("the stream did not answer in time");
+  return in_time ? Ended() : TimeOut();
 }
 
 absl::Status CollisionStream::Close() {
   if (held_) StartWritesDone();
+  ReleaseHold();
+  std::unique_lock lock(mutex_);
+  const bool in_time = changed_.wait_for(lock, timeout_, [this] { return done_; });
+  lock.unlock();
+  return in_time ? WaitUntilDone() : TimeOut();
+}
+
+// Ends the stream of a server that does not answer.
+absl::Status CollisionStream::TimeOut() {
+  context_.TryCancel();
+  WaitUntilDone().IgnoreError();
+  status_ = {grpc::StatusCode::DEADLINE_EXCEEDED,
+             absl::StrCat("the server did not answer within ", timeout_.count(), " ms")};
   return WaitUntilDone();
 }
 
@@ -88,7 +98,7 @@ absl::Status CollisionStream::WaitUntilDone() {
   ReleaseHold();
   std::unique_lock lock(mutex_);
   changed_.wait(lock, [this] { return done_; });
-  return FromGrpcStatus(status_);
+  return FromGrpcStatus(status_, context_);
 }
 
 void CollisionStream::ReleaseHold() {

@@ -33,13 +33,14 @@ class CollisionStream final
   absl::StatusOr<v1::StreamCollisionsResponse> Open(v1::CollisionStreamOpen open);
   absl::StatusOr<v1::StreamCollisionsResponse> Update(v1::CollisionStreamUpdate update);
 
-  // Half-closes the stream and returns its final status.
+  // Half-closes the stream and returns its final status, within the timeout.
   absl::Status Close();
 
  private:
   absl::StatusOr<v1::StreamCollisionsResponse> Exchange();
   void ReleaseHold();
   absl::Status Ended();
+  absl::Status TimeOut();
   absl::Status WaitUntilDone();
 
   void OnReadDone(bool ok) override;

@@ -37,6 +37,10 @@ std::optional<rpc::ErrorInfo> InfoOf(const absl::Status& status) {
 }  // namespace
 
 absl::Status FromGrpcStatus(const grpc::Status& status) {
+  // gRPC reports CANCELLED when a call reaches a server during its shutdown.
+  if (status.error_code() == grpc::StatusCode::CANCELLED) {
+    return absl::UnavailableError("the server ended the call because it is shutting down");
+  }
   absl::Status result(static_cast<absl::StatusCode>(status.error_code()), status.error_message());
   rpc::Status details;
   if (result.ok() || !details.ParseFromString(status.error_details())) return result;

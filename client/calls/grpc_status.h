@@ -13,7 +13,8 @@
 
 namespace hulld {
 
-// Returns the same code and message, with the server's reason.
+// Returns the same code and message, with the server's reason; UNAVAILABLE instead of CANCELLED.
+// Requires: the client did not cancel the call.
 absl::Status FromGrpcStatus(const grpc::Status& status);
 
 // Same as above, with the request ID and the retry hint. context: the context of the finished call.

@@ -12,6 +12,9 @@ constexpr uint64_t kLargestMessages = 4;
 // Keepalive interval and timeout.
 constexpr int kKeepaliveTimeMs = 60'000;
 constexpr int kKeepaliveTimeoutMs = 20'000;
+// Minimum interval of clients' pings, which gRPC would set to 5 minutes. Connections that send
+// three pings too early are closed.
+constexpr int kMinPingIntervalMs = 500;
 
 }  // namespace
 
@@ -39,6 +42,8 @@ void SetTransport(const Config& config, grpc::ServerBuilder& builder) {
   // Frees the streams of a silently vanished peer within a minute or two instead of hours.
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveTimeMs);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveTimeoutMs);
+  builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS,
+                             kMinPingIntervalMs);
 }
 
 }  // namespace hulld::server

@@ -61,6 +61,23 @@ TEST_F(ClientTest, SafeCallsAreRetried) {
   }
 }
 
+// gRPC ends a call with CANCELLED if it reaches a server during its shutdown.
+TEST_F(ClientTest, CallsAndStreamsSurviveTheShutdownOfAServer) {
+  fake_.PutHull("a", {});
+  v1::GetHullMeshResponse header;
+  header.mutable_header();
+  fake_.mesh_parts = {header};
+  const grpc::Status cancelled(grpc::StatusCode::CANCELLED, "CANCELLED");
+  for (const char* method : {"GetHull", "GetHullMesh", "BatchCheckCollisions", "AppendPoints"}) {
+    fake_.FailNext(method, {cancelled});
+  }
+  const Client client = MakeClient();
+  EXPECT_TRUE(client.GetHull("a").ok());
+  EXPECT_TRUE(client.GetHullMesh("a").ok());
+  EXPECT_TRUE(client.BatchCheckCollisions({}, [](const auto&) { return absl::OkStatus(); }).ok());
+  EXPECT_TRUE(client.OpenAppend("a").ok());
+}
+
 TEST_F(ClientTest, UnsafeCallsAreNotRetried) {
   fake_.PutHull("a", {});
   fake_.FailNext("DeleteHull", {unavailable_});
@@ -82,6 +99,29 @@ TEST_F(ClientTest, AServerThatDoesNotAnswerCausesADeadlineError) {
   fake_.Hang("GetHull");
   const auto hull = MakeClient(std::chrono::milliseconds(50)).GetHull("a");
   EXPECT_TRUE(absl::IsDeadlineExceeded(hull.status())) << hull.status();
+}
+
+TEST_F(ClientTest, ACollisionStreamWithoutAnswerKeepsItsDeadlineError) {
+  fake_.Hang("StreamCollisions");
+  const auto stream = MakeClient(std::chrono::milliseconds(50)).OpenCollisionStream();
+  for (int i = 0; i < 2; ++i) {
+    const absl::Status status = stream->Open({}).status();
+    EXPECT_TRUE(absl::IsDeadlineExceeded(status)) << status;
+  }
+  EXPECT_TRUE(absl::IsDeadlineExceeded(stream->Close()));
+}
+
+TEST_F(ClientTest, ClosingACollisionStreamWaitsNoLongerThanTheTimeout) {
+  fake_.Hang("StreamCollisions end");
+  const auto stream = MakeClient(std::chrono::milliseconds(50)).OpenCollisionStream();
+  const absl::Status status = stream->Close();
+  EXPECT_TRUE(absl::IsDeadlineExceeded(status)) << status;
+}
+
+TEST_F(ClientTest, TheLongestTimeoutIsAccepted) {
+  fake_.PutHull("a", {});
+  const auto hull = MakeClient(std::chrono::milliseconds::max()).GetHull("a");
+  EXPECT_TRUE(hull.ok()) << hull.status();
 }
 
 TEST_F(ClientTest, AMissingServerIsUnavailable) {

@@ -305,6 +305,21 @@ class FakeHulld::Collisions final : public v1::CollisionService::Service {
     return grpc::Status::OK;
   }
 
+  // Every answer is empty. "StreamCollisions end" is the end of the stream.
+  grpc::Status StreamCollisions(
+      grpc::ServerContext*,
+      grpc::ServerReaderWriter<v1::StreamCollisionsResponse, v1::StreamCollisionsRequest>* stream)
+      override {
+    v1::StreamCollisionsRequest request;
+    while (stream->Read(&request)) {
+      if (auto status = fake_.Enter("StreamCollisions"); !status.ok()) return status;
+      v1::StreamCollisionsResponse response;
+      response.set_last(true);
+      stream->Write(response);
+    }
+    return fake_.Enter("StreamCollisions end");
+  }
+
  private:
   FakeHulld& fake_;
 };

@@ -95,6 +95,11 @@ class Connection:
             # The time for one connection attempt, TLS handshake included.
             ("grpc.min_reconnect_backoff_ms", 5000),
             ("grpc.max_reconnect_backoff_ms", 500),
+            # Detects a server that vanished silently, for which a watch would otherwise wait
+            # forever.
+            ("grpc.keepalive_time_ms", 60_000),
+            ("grpc.keepalive_timeout_ms", 20_000),
+            ("grpc.http2.max_pings_without_data", 0),
         ]
         if _is_list(self.server) or self.server.startswith("dns:///"):
             options.append(("grpc.service_config", _SPREAD_CALLS))

@@ -191,7 +191,11 @@ def from_status(code: str, message: str, trailing: Iterable[tuple[str, Any]] | N
 
 def from_rpc_error(error: Any) -> HulldError:
     """Converts gRPC's exception, of its synchronous or its asynchronous interface."""
-    return from_status(error.code().name, error.details() or "", error.trailing_metadata())
+    code, details = error.code().name, error.details() or ""
+    # gRPC also reports CANCELLED when a call reaches a server during its shutdown.
+    if code == "CANCELLED" and not details.startswith(("Locally cancelled", "Channel closed")):
+        code, details = "UNAVAILABLE", "the server ended the call because it is shutting down"
+    return from_status(code, details, error.trailing_metadata())
 
 
 def _error_info(details: Any) -> tuple[str | None, dict[str, str]]:

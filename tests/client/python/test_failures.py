@@ -41,6 +41,11 @@ def unavailable(context: Any) -> None:
     refuse(context, grpc.StatusCode.UNAVAILABLE, "the server ends soon", reason="DRAINING")
 
 
+def stopping(context: Any) -> None:
+    """Ends the call like a server in the last moment of its shutdown."""
+    context.abort(grpc.StatusCode.CANCELLED, "CANCELLED")
+
+
 def busy(context: Any) -> None:
     refuse(
         context,
@@ -69,6 +74,16 @@ def test_calls_that_are_safe_to_repeat_are_retried(caller: Any, fake: FakeHulld)
     fake.script = [unavailable, busy, unavailable]
     assert caller.get_status().version == "fake"
     assert len(fake.calls) == 4
+
+
+def test_calls_survive_the_shutdown_of_a_server(caller: Any, fake: FakeHulld) -> None:
+    fake.script = [stopping]
+    assert caller.get_status().version == "fake"
+    fake.script = [stopping]
+    assert caller.append_points("a", np.zeros((7, 3)), create=True).points_acknowledged == 7
+    fake.script = [stopping]
+    with caller.watch_hulls() as watch:
+        assert next(watch).header.revision == 10
 
 
 def test_attempts_are_counted(caller: Any, fake: FakeHulld) -> None:

@@ -169,3 +169,7 @@ def test_the_channel_finds_a_restarted_server_soon(server: hulld.LocalServer) ->
     assert options["grpc.dns_min_time_between_resolutions_ms"] == 100
     assert options["grpc.initial_reconnect_backoff_ms"] <= 100
     assert options["grpc.max_reconnect_backoff_ms"] <= 500
+    # By default gRPC never notices that a server vanished silently while a watch is quiet.
+    assert options["grpc.keepalive_time_ms"] <= 60_000
+    assert options["grpc.keepalive_timeout_ms"] <= 20_000
+    assert options["grpc.http2.max_pings_without_data"] == 0

@@ -175,6 +175,21 @@ TEST(Attacks, AClientCannotForgeLinesOfTheLog) {
               testing::EndsWith("value=1X\\u000aforged \\u001b[31m\\ufffd\n"));
 }
 
+// By default gRPC closes the connection of an idle watch at the third ping within five minutes.
+TEST(Attacks, AnIdleWatchMayPingEverySecond) {
+  Process hulld({"--store", "memory", "--listen", "127.0.0.1:0"});
+  Attacker client(AddressIn(hulld.ReadLineWith("listening on ")));
+  ASSERT_TRUE(client.Send(
+      kOpening +
+      FrameBytes(Frame::kHeaders, kEndHeadersFlag, 1, HeaderBlock("/grpc.health.v1.Health/Watch")) +
+      FrameBytes(Frame::kData, kEndStreamFlag, 1, MessageBytes(""))));
+  for (int i = 0; i < 6; ++i) {
+    // A longer pause changes nothing.
+    std::this_thread::sleep_for(std::chrono::seconds(1));
+    ASSERT_TRUE(client.Send(FrameBytes(Frame::kPing, 0, 0, "12345678"))) << i;
+  }
+}
+
 // CVE-2023-4785: gRPC's own listener stops accepting after descriptors run out.
 TEST(Attacks, ConnectionsThatExhaustTheDescriptorsAreSurvived) {
   for (const char* const listen : {"127.0.0.1:0", "[::]:0"}) {
