@@ -1,8 +1,13 @@
 #include "server/store/files/log_file_system.h"
 
+#include <fcntl.h>
 #include <spdlog/spdlog.h>
+#include <sys/file.h>
+#include <unistd.h>
 #include <zlib.h>
 
+#include <cerrno>
+#include <cstring>
 #include <utility>
 
 namespace hulld::server {
@@ -326,7 +331,9 @@ IOStatus LogFileSystem::DeleteFile(const std::string& name, const IOOptions& opt
 
 IOStatus LogFileSystem::LockFile(const std::string& name, const IOOptions& options,
                                  rocksdb::FileLock** lock, IODebugContext* debug) {
+  if (IOStatus locked = LockDirectory(); !locked.ok()) return locked;
   IOStatus status = FileSystemWrapper::LockFile(name, options, lock, debug);
+  if (!status.ok()) UnlockDirectory();
   if (!status.ok() || !locked_) return status;
   status = locked_();
   if (!status.ok()) {
@@ -334,6 +341,27 @@ IOStatus LogFileSystem::LockFile(const std::string& name, const IOOptions& optio
     *lock = nullptr;
   }
   return status;
+}
+
+IOStatus LogFileSystem::UnlockFile(rocksdb::FileLock* lock, const IOOptions& options,
+                                   IODebugContext* debug) {
+  UnlockDirectory();
+  return FileSystemWrapper::UnlockFile(lock, options, debug);
+}
+
+// A file system without such locks has only the lock file.
+IOStatus LogFileSystem::LockDirectory() {
+  directory_lock_ = open(directory_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (directory_lock_ < 0 || flock(directory_lock_, LOCK_EX | LOCK_NB) == 0) return IOStatus::OK();
+  const int error = errno;
+  UnlockDirectory();
+  if (error != EWOULDBLOCK) return IOStatus::OK();
+  return IOStatus::IOError("While lock file: " + directory_, std::strerror(error));
+}
+
+void LogFileSystem::UnlockDirectory() {
+  if (directory_lock_ >= 0) close(directory_lock_);
+  directory_lock_ = -1;
 }
 
 IOStatus LogFileSystem::GetFreeSpace(const std::string&, const IOOptions&, uint64_t*,

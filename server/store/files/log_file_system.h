@@ -27,6 +27,9 @@ namespace hulld::server {
 // commit, and no sync: it is synced in the background and before a log is deleted. The mark also
 // covers the manifest.
 //
+// Locks the directory of the logs in addition to RocksDB's lock file, which a user may delete, and
+// which does not exclude the same process if it names the file differently.
+//
 // Hides the free space of the disk from RocksDB, which would otherwise resume after an error and
 // write to a failed log.
 class LogFileSystem : public rocksdb::FileSystemWrapper {
@@ -74,6 +77,8 @@ class LogFileSystem : public rocksdb::FileSystemWrapper {
                                rocksdb::IODebugContext* debug) override;
   rocksdb::IOStatus LockFile(const std::string& name, const rocksdb::IOOptions& options,
                              rocksdb::FileLock** lock, rocksdb::IODebugContext* debug) override;
+  rocksdb::IOStatus UnlockFile(rocksdb::FileLock* lock, const rocksdb::IOOptions& options,
+                               rocksdb::IODebugContext* debug) override;
   rocksdb::IOStatus GetFreeSpace(const std::string& path, const rocksdb::IOOptions& options,
                                  uint64_t* bytes, rocksdb::IODebugContext* debug) override;
 
@@ -90,6 +95,8 @@ class LogFileSystem : public rocksdb::FileSystemWrapper {
   };
 
   bool IsLog(const std::string& name) const;
+  rocksdb::IOStatus LockDirectory();
+  void UnlockDirectory();
   rocksdb::IOStatus NoteSync(const rocksdb::IOStatus& status);
   rocksdb::IOStatus Cut(const std::string& name, const LogState& log);
   // Adds the synced bytes of a manifest to the mark if CURRENT names it.
@@ -104,6 +111,8 @@ class LogFileSystem : public rocksdb::FileSystemWrapper {
 
   const std::string directory_;
   std::function<rocksdb::IOStatus()> locked_;
+  // The locked directory; -1: none.
+  int directory_lock_ = -1;
   std::atomic<uint64_t> failed_syncs_ = 0;
   // True if CURRENT was renamed and the directory not synced since.
   std::atomic<bool> is_current_new_ = false;

@@ -245,6 +245,20 @@ TEST_F(RocksDbRecovery, ASecondServerIsRefused) {
   EXPECT_THAT(std::string(second.status().message()), HasSubstr("in use by another hulld"));
 }
 
+// RocksDB locks only a file, and within a process only one name of it.
+TEST_F(RocksDbRecovery, ASecondServerIsRefusedAfterTheLockFileWasDeleted) {
+  Start();
+  ASSERT_TRUE(std::filesystem::remove(directory_ + "/data/rocksdb/LOCK"));
+  RocksDbOptions options;
+  options.data_dir = directory_ + "/data/.";
+  for (const bool read_only : {false, true}) {
+    options.read_only = read_only;
+    const absl::Status second = RocksDbStore::Open(options).status();
+    EXPECT_EQ(second.code(), absl::StatusCode::kFailedPrecondition) << second;
+    EXPECT_THAT(std::string(second.message()), HasSubstr("in use by another hulld"));
+  }
+}
+
 TEST_P(StoreRecovery, AnOlderOrNewerFormatIsRefused) {
   const std::vector<uint64_t> formats = kept_->formats();
   Start();
