@@ -46,8 +46,7 @@ constexpr char kSharedTables[] = R"(
     PRIMARY KEY (batch, id));
   CREATE TABLE hulld.servers (
     owner text PRIMARY KEY,
-    batch bigint NOT NULL,
-    seen timestamptz NOT NULL DEFAULT now());
+    batch bigint NOT NULL);
   ALTER TABLE hulld.store ADD COLUMN pruned bigint NOT NULL DEFAULT 0;
   COMMIT;)";
 
@@ -81,11 +80,11 @@ constexpr char kPrepareShared[] = R"(
       SELECT * FROM unnest($1, $2, $3, $4, $5, $6);
     PREPARE hulld_put_server(text, bigint) AS
       INSERT INTO hulld.servers (owner, batch) VALUES ($1, $2)
-      ON CONFLICT (owner) DO UPDATE SET batch = excluded.batch, seen = now();
+      ON CONFLICT (owner) DO UPDATE SET batch = excluded.batch;
     PREPARE hulld_server(text) AS SELECT batch FROM hulld.servers WHERE owner = $1;
     PREPARE hulld_drop_server(text) AS DELETE FROM hulld.servers WHERE owner = $1;
-    PREPARE hulld_drop_old_servers AS
-      DELETE FROM hulld.servers WHERE seen < now() - interval '1 day';
+    PREPARE hulld_drop_old_servers(bigint) AS
+      DELETE FROM hulld.servers WHERE batch < $1;
     PREPARE hulld_touch(bigint) AS UPDATE hulld.store SET written_in = $1;
     PREPARE hulld_prune(bigint) AS
       WITH pruned AS (UPDATE hulld.store SET pruned = $1)
@@ -143,8 +142,12 @@ absl::Status PostgresStore::Join() {
         "the store was open with synchronous_commit = off and not shut down cleanly; start and "
         "stop one hulld with --postgres-servers one first, which gives the store a new ID");
   }
-  // Drops killed servers. A server that may still query its last batch committed it recently.
-  return writer_->Execute({.name = "hulld_drop_old_servers"}).status();
+  // Drops killed servers. A server that may still query its last batch committed it recently, by
+  // the number of later batches, because the database's clock may jump.
+  const uint64_t batch = batch_;
+  const uint64_t oldest = batch - std::min(batch, kKeptBatches);
+  return writer_->Execute({.name = "hulld_drop_old_servers", .parameters = {EncodeBigint(oldest)}})
+      .status();
 }
 
 // Removes this server's last batch, which is not needed after an orderly end.

@@ -48,7 +48,7 @@ constexpr char kPrepareShared[] = R"(
     SELECT $1, * FROM unnest($2, $3, $4);
   PREPARE put_server(text, bigint) AS
     INSERT INTO hulld.servers (owner, batch) VALUES ($1, $2)
-    ON CONFLICT (owner) DO UPDATE SET batch = excluded.batch, seen = now();
+    ON CONFLICT (owner) DO UPDATE SET batch = excluded.batch;
   PREPARE prune(bigint) AS
     WITH pruned AS (UPDATE hulld.store SET pruned = $1)
     DELETE FROM hulld.changes WHERE batch <= $1;)";

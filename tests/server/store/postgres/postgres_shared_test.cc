@@ -15,6 +15,7 @@
 namespace hulld::server {
 namespace postgres_shared_test {
 
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using Cut = CuttingProxy::Cut;
 using Server = std::unique_ptr<PostgresRegistry>;
@@ -607,6 +608,17 @@ TEST_F(PostgresShared, AllServersContinueWhenTheDatabaseEndsTheirSessions) {
       "AND pid <> pg_backend_pid()");
   ASSERT_TRUE(other->Put("h", {{9, 9, 9}}).ok());
   EXPECT_EQ(Received(*hulls_, "h"), 9);
+}
+
+// The database's clock may jump, so that the number of later batches decides, not the time.
+TEST_F(PostgresShared, AStartDropsKilledServers) {
+  Start();
+  ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
+  RunSql("UPDATE hulld.store SET batch = 100000");
+  RunSql("INSERT INTO hulld.servers VALUES ('killed', 30000), ('in doubt', 40000)");
+  const Server other = StartPeer();
+  EXPECT_THAT(RunSql("SELECT owner FROM hulld.servers WHERE owner IN ('killed', 'in doubt')"),
+              ElementsAre("in doubt"));
 }
 
 TEST_F(PostgresShared, AnExclusiveServerAndSharedServersExcludeEachOther) {
