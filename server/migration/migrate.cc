@@ -14,6 +14,7 @@
 #include "server/settings/subcommand.h"
 #include "server/store/postgres/postgres_store.h"
 #include "server/store/rocksdb_store.h"
+#include "server/store/store_errors.h"
 
 namespace hulld::server {
 namespace {
@@ -174,10 +175,16 @@ int RunMigrate(const std::vector<std::string>& arguments, std::ostream& out, std
   SetUpLog("warn", "text");
   const absl::Status status = Run(from, to, out, err);
   if (status.ok()) return 0;
-  err << "hulld migrate: " << std::string(status.message()) << "\n";
+  // The message of a store advises the clients of a server.
+  err << "hulld migrate: "
+      << (IsDiskFull(status) ? "the disk of the destination is full"
+                             : std::string(status.message()))
+      << "\n";
   const bool is_refused = absl::IsFailedPrecondition(status) || absl::IsInvalidArgument(status) ||
                           absl::IsNotFound(status);
-  return is_refused ? kExitRefused : kExitFailed;
+  if (is_refused) return kExitRefused;
+  err << "The copy is incomplete; fix the cause, then run the same command again to resume it.\n";
+  return kExitFailed;
 }
 
 }  // namespace hulld::server

@@ -185,7 +185,7 @@ rocksdb::Status RocksDbStore::OpenForReading() {
 
 absl::Status RocksDbStore::OpenDbWithReserve() {
   absl::Status opened = OpenDb();
-  if (options_.read_only) return opened;
+  if (options_.read_only || options_.migrating) return opened;
   if (IsDiskFull(opened) && reserve_.Release()) opened = OpenDb();
   if (!IsDiskFull(opened)) {
     if (opened.ok() && !reserve_.Ensure().ok()) {

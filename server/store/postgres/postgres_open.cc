@@ -304,7 +304,9 @@ absl::Status PostgresStore::CheckServer(Session& session) {
   HULLD_ASSIGN_OR_RETURN(
       const Rows settings,
       session.Run("SELECT current_setting('synchronous_commit'), current_setting('fsync')"));
-  synchronous_commit_ = options_.migrating ? "on" : std::string(settings.at(0, 0));
+  // A source of a migration stays the same store if the migration is killed.
+  const bool migrates = options_.migrating || options_.must_exist;
+  synchronous_commit_ = migrates ? "on" : std::string(settings.at(0, 0));
   const bool is_sync = synchronous_commit_ != "off" && settings.at(0, 1) == "on";
   durability_ = is_sync ? Durability::kSync : Durability::kRelaxed;
   if (options_.shared && !is_sync) {

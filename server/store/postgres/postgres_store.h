@@ -40,7 +40,8 @@ struct PostgresOptions {
   // Also opens a store with an unfinished migration. Commits are on disk, regardless of the role's
   // default.
   bool migrating = false;
-  // Opens only a database that contains a store.
+  // The source of a migration: opens only a database that contains a store. Commits are on disk,
+  // too.
   bool must_exist = false;
   // Other servers may be active over the same database. Cannot be combined with take_over.
   bool shared = false;

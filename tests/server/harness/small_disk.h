@@ -42,6 +42,10 @@ class SmallDisk {
     }
     close(file);
   }
+  void Resize(int mebibytes) const {
+    mount("none", path_.c_str(), "tmpfs", MS_REMOUNT,
+          absl::StrCat("size=", mebibytes, "m").c_str());
+  }
   void Free() const { std::filesystem::remove(filler()); }
 
   static constexpr char kNoMount[] = "nothing may be mounted here";

@@ -14,12 +14,14 @@
 #include "server/store/rocksdb_store.h"
 #include "server/store/store_keys.h"
 #include "tests/server/harness/postgres/postgres_cluster.h"
+#include "tests/server/harness/small_disk.h"
 #include "tests/server/harness/store_fixture.h"
 
 namespace hulld::server {
 namespace migration_test {
 
 using ::testing::HasSubstr;
+using ::testing::Not;
 using ::testing::StartsWith;
 
 using AnyRegistry = TestRegistry<Store>;
@@ -368,6 +370,40 @@ TEST_P(MigrationTest, TheCommandLineIsChecked) {
   EXPECT_THAT(err.str(), HasSubstr("source and destination are both x"));
   EXPECT_EQ(RunMigrate({"--help"}, out, err), 0);
   EXPECT_THAT(out.str(), HasSubstr("the copy is a new store"));
+}
+
+TEST(MigrationOfADirectory, AnotherNameOfTheSourceIsRefused) {
+  const StorePlace from("rocksdb");
+  ASSERT_TRUE(from.Serve()->Put("h", CubeCorners()).ok());
+  const std::string source = from.data_dir();
+  std::filesystem::create_directory_symlink(source, source + "-link");
+  for (const std::string& to : {source + "/", source + "-link"}) {
+    std::ostringstream out;
+    std::ostringstream err;
+    EXPECT_EQ(RunMigrate({"--from-data-dir", source, "--to-data-dir", to}, out, err), 2) << to;
+    EXPECT_THAT(err.str(), HasSubstr("--data-dir " + to + " is in use by another hulld"));
+  }
+}
+
+TEST(MigrationOfADirectory, AFullDiskInterruptsIt) {
+  const SmallDisk disk(2);
+  if (!disk.is_mounted()) GTEST_SKIP() << SmallDisk::kNoMount;
+  const StorePlace from("rocksdb");
+  ASSERT_TRUE(from.Serve()->Put("h", SpherePoints(100'000)).ok());
+  const std::vector<std::string> arguments = {"--from-data-dir", from.data_dir(), "--to-data-dir",
+                                              disk.directory() + "/data"};
+  for (int run = 0; run < 2; ++run) {
+    std::ostringstream out;
+    std::ostringstream err;
+    EXPECT_EQ(RunMigrate(arguments, out, err), 1);
+    EXPECT_THAT(err.str(), HasSubstr("the disk of the destination is full\n"));
+    EXPECT_THAT(err.str(), HasSubstr("fix the cause, then run the same command again"));
+    EXPECT_THAT(err.str(), Not(HasSubstr("nothing was changed")));
+  }
+  disk.Resize(64);
+  std::ostringstream out;
+  std::ostringstream err;
+  EXPECT_EQ(RunMigrate(arguments, out, err), 0) << err.str();
 }
 
 #ifdef HULLD_SANITIZED

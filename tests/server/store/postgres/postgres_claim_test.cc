@@ -11,6 +11,7 @@
 namespace hulld::server {
 namespace postgres_claim_test {
 
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -140,6 +141,18 @@ TEST_F(PostgresClaim, WithoutSyncAnUncleanStoreGetsANewId) {
   RunSql("ALTER ROLE hulld RESET synchronous_commit");
   Start();
   EXPECT_EQ(hulls_->store().durability(), Durability::kSync);
+}
+
+// A killed migration leaves its source without a clean end.
+TEST_F(PostgresClaim, TheSourceOfAMigrationStaysTheSameStore) {
+  RunSql("ALTER ROLE hulld SET synchronous_commit = off");
+  Start();
+  hulls_ = nullptr;
+  options_.must_exist = true;
+  Start();
+  EXPECT_EQ(hulls_->store().durability(), Durability::kSync);
+  EXPECT_THAT(RunSql("SELECT relaxed FROM hulld.store"), ElementsAre("f"));
+  RunSql("ALTER ROLE hulld RESET synchronous_commit");
 }
 
 TEST_F(PostgresClaim, ARestoredDatabaseGetsANewId) {
