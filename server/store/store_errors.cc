@@ -27,11 +27,12 @@ bool IsLocked(const std::string& cause) {
 }
 
 absl::Status DiskFull(const std::string& cause, const std::string& data_dir) {
-  return WithReason(absl::ResourceExhaustedError(absl::StrCat(
-                        "the disk that contains --data-dir ", data_dir, " is full (", cause,
-                        "); nothing was changed; delete hulls or free disk space, then retry; no "
-                        "restart is needed")),
-                    v1::ERROR_REASON_DISK_FULL);
+  return WithReason(
+      absl::ResourceExhaustedError(absl::StrCat(
+          "the disk that contains --data-dir ", data_dir, " is full (", cause,
+          "); nothing was changed; free disk space, or delete hulls if the server still "
+          "accepts that, then retry; no restart is needed")),
+      v1::ERROR_REASON_DISK_FULL);
 }
 
 std::string Acknowledged(std::optional<uint64_t> revision) {

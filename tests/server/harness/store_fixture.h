@@ -41,13 +41,12 @@ class TestRegistry {
   }
 
   absl::StatusOr<PutHullResult> Create(const std::string& id, bool if_absent = false) {
-    return Wait<PutHullResult>([&](Reply<PutHullResult> done) {
-      registry_.changes().Create(id, if_absent, std::move(done));
-    });
+    return Wait<PutHullResult>(
+        [&](const Reply<PutHullResult>& done) { registry_.changes().Create(id, if_absent, done); });
   }
   absl::StatusOr<uint64_t> Delete(const std::string& id) {
-    return Wait<uint64_t>([&](Reply<uint64_t> done) {
-      registry_.changes().Delete("hull", id, std::nullopt, std::move(done));
+    return Wait<uint64_t>([&](const Reply<uint64_t>& done) {
+      registry_.changes().Delete("hull", id, std::nullopt, done);
     });
   }
   absl::StatusOr<OpenResult> Open(const std::string& id, const std::string& writer = "w",
@@ -75,8 +74,8 @@ class TestRegistry {
     return result;
   }
   absl::StatusOr<PutHullResult> Replace(Replacement replacement) {
-    return Wait<PutHullResult>([&](Reply<PutHullResult> done) {
-      registry_.changes().Replace(std::move(replacement), std::move(done));
+    return Wait<PutHullResult>([&](const Reply<PutHullResult>& done) {
+      registry_.changes().Replace(std::move(replacement), done);
     });
   }
   absl::StatusOr<HullView> View(const std::string& id) {

@@ -160,8 +160,8 @@ class MigrationTest : public ::testing::TestWithParam<std::tuple<const char*, co
     body.record.body_id = id;
     body.hull_ids = {"grown", "empty"};
     body.pieces = {{0, Pose()}, {1, Pose()}, {0, {.q = {1, 0, 0.5, 0}, .t = {0.1, -0.0, 3}}}};
-    const auto put = AnyRegistry::Wait<PutBodyResult>([&](Reply<PutBodyResult> done) {
-      hulls.registry().changes().PutBody(body, {}, std::move(done));
+    const auto put = AnyRegistry::Wait<PutBodyResult>([&](const Reply<PutBodyResult>& done) {
+      hulls.registry().changes().PutBody(body, {}, done);
     });
     ASSERT_TRUE(put.ok()) << put.status();
   }

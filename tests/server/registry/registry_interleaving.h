@@ -178,8 +178,8 @@ class RegistryInterleaving : public ::testing::Test {
   }
 
   absl::StatusOr<uint64_t> Delete(const std::string& id) {
-    return DurableRegistry::Wait<uint64_t>([&](Reply<uint64_t> done) {
-      registry_.changes().Delete("hull", id, std::nullopt, std::move(done));
+    return DurableRegistry::Wait<uint64_t>([&](const Reply<uint64_t>& done) {
+      registry_.changes().Delete("hull", id, std::nullopt, done);
     });
   }
   std::future<absl::StatusOr<Resolved>> StartResolve(std::vector<std::string> ids,

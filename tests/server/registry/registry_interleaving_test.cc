@@ -286,8 +286,8 @@ TEST_F(RegistryInterleaving, AHullThatIsReplacedWhileItIsReadIsTheNewOne) {
   replacement.hull_id = "h";
   replacement.builder = std::make_shared<HullBuilder>();
   replacement.counts = *replacement.builder->Add(CubeCorners(5, 1));
-  ASSERT_TRUE(DurableRegistry::Wait<PutHullResult>([&](Reply<PutHullResult> done) {
-                registry_.changes().Replace(std::move(replacement), std::move(done));
+  ASSERT_TRUE(DurableRegistry::Wait<PutHullResult>([&](const Reply<PutHullResult>& done) {
+                registry_.changes().Replace(std::move(replacement), done);
               }).ok());
   gate.Open();
   const auto resolved = reader.get();

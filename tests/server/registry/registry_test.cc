@@ -57,8 +57,8 @@ class RegistryTest : public ::testing::Test {
   AppendSession Open(const std::string& id) { return OpenAppend(id, "w")->session; }
 
   absl::StatusOr<uint64_t> Delete(const std::string& id) {
-    return Wait<uint64_t>([&](Reply<uint64_t> done) {
-      registry_.changes().Delete("hull", id, std::nullopt, std::move(done));
+    return Wait<uint64_t>([&](const Reply<uint64_t>& done) {
+      registry_.changes().Delete("hull", id, std::nullopt, done);
     });
   }
 

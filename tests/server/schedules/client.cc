@@ -151,8 +151,8 @@ void Client::Create() {
     ledger().Report(call.hull, *state);
   };
   Await<PutHullResult>(
-      [&](Reply<PutHullResult> done) {
-        simulation_.registry.changes().Create(HullName(call.hull), if_absent, std::move(done));
+      [&](const Reply<PutHullResult>& done) {
+        simulation_.registry.changes().Create(HullName(call.hull), if_absent, done);
       },
       check);
 }
@@ -174,9 +174,8 @@ void Client::Delete() {
     Claim(call, ledger().Find(call.hull, call.since, is_it), absl::StrCat("deleted at ", *result));
   };
   Await<uint64_t>(
-      [&](Reply<uint64_t> done) {
-        simulation_.registry.changes().Delete("hull", HullName(call.hull), call.if_revision,
-                                              std::move(done));
+      [&](const Reply<uint64_t>& done) {
+        simulation_.registry.changes().Delete("hull", HullName(call.hull), call.if_revision, done);
       },
       check);
 }
@@ -211,8 +210,8 @@ void Client::Replace() {
     }
   };
   Await<PutHullResult>(
-      [&](Reply<PutHullResult> done) {
-        simulation_.registry.changes().Replace(std::move(replacement), std::move(done));
+      [&](const Reply<PutHullResult>& done) {
+        simulation_.registry.changes().Replace(std::move(replacement), done);
       },
       check);
 }

@@ -84,8 +84,8 @@ void Client::PutBody() {
     ++simulation_.reached.bodies_put;
   };
   Await<PutBodyResult>(
-      [&](Reply<PutBodyResult> done) {
-        simulation_.registry.changes().PutBody(std::move(body), call.if_revision, std::move(done));
+      [&](const Reply<PutBodyResult>& done) {
+        simulation_.registry.changes().PutBody(std::move(body), call.if_revision, done);
       },
       check);
 }
@@ -106,9 +106,8 @@ void Client::DeleteBody() {
     ++simulation_.reached.bodies_deleted;
   };
   Await<uint64_t>(
-      [&](Reply<uint64_t> done) {
-        simulation_.registry.changes().Delete("body", HullName(call.hull), std::nullopt,
-                                              std::move(done));
+      [&](const Reply<uint64_t>& done) {
+        simulation_.registry.changes().Delete("body", HullName(call.hull), std::nullopt, done);
       },
       check);
 }

@@ -163,16 +163,16 @@ TEST_P(StoreRecovery, BodiesAreRestoredAndDamagedIndividually) {
     body.hull_ids = {"cube"};
     body.pieces.resize(2);
     body.pieces[1].X_BP.t = Vector(x, 0, 0);
-    return KeptRegistry::Wait<PutBodyResult>([&](Reply<PutBodyResult> done) {
-      hulls_->registry().changes().PutBody(body, std::nullopt, std::move(done));
+    return KeptRegistry::Wait<PutBodyResult>([&](const Reply<PutBodyResult>& done) {
+      hulls_->registry().changes().PutBody(body, std::nullopt, done);
     });
   };
   ASSERT_TRUE(put("changed", 1).ok());
   ASSERT_TRUE(put("changed", 2).ok());
   ASSERT_TRUE(put("damaged", 3).ok());
   ASSERT_TRUE(put("gone", 4).ok());
-  ASSERT_TRUE(KeptRegistry::Wait<uint64_t>([&](Reply<uint64_t> done) {
-                first.registry().changes().Delete("body", "gone", std::nullopt, std::move(done));
+  ASSERT_TRUE(KeptRegistry::Wait<uint64_t>([&](const Reply<uint64_t>& done) {
+                first.registry().changes().Delete("body", "gone", std::nullopt, done);
               }).ok());
   std::string value = kept_->Get(BodyKey("damaged"));
   value[value.size() / 2] ^= 4;

@@ -43,13 +43,13 @@ class PostgresRecords : public PostgresTest {
     body.record.body_id = id;
     body.hull_ids = {"a"};
     body.pieces.assign(pieces, StoredPiece());
-    return PostgresRegistry::Wait<PutBodyResult>([&](Reply<PutBodyResult> done) {
-      server.registry().changes().PutBody(std::move(body), std::nullopt, std::move(done));
+    return PostgresRegistry::Wait<PutBodyResult>([&](const Reply<PutBodyResult>& done) {
+      server.registry().changes().PutBody(std::move(body), std::nullopt, done);
     });
   }
   static absl::StatusOr<uint64_t> DeleteBody(PostgresRegistry& server, const std::string& id) {
-    return PostgresRegistry::Wait<uint64_t>([&](Reply<uint64_t> done) {
-      server.registry().changes().Delete("body", id, std::nullopt, std::move(done));
+    return PostgresRegistry::Wait<uint64_t>([&](const Reply<uint64_t>& done) {
+      server.registry().changes().Delete("body", id, std::nullopt, done);
     });
   }
   // DATA_LOSS or NOT_FOUND if the record is unavailable.

@@ -57,8 +57,8 @@ class PostgresShared : public PostgresTest {
     body.record.body_id = id;
     body.hull_ids = {"piece"};
     body.pieces = {{0, Pose()}};
-    return PostgresRegistry::Wait<PutBodyResult>([&](Reply<PutBodyResult> done) {
-      server.registry().changes().PutBody(std::move(body), if_revision, std::move(done));
+    return PostgresRegistry::Wait<PutBodyResult>([&](const Reply<PutBodyResult>& done) {
+      server.registry().changes().PutBody(std::move(body), if_revision, done);
     });
   }
   // Returns the hull as currently stored.
@@ -261,8 +261,8 @@ TEST_F(PostgresShared, BodiesAndHullsShareTheirIdsAcrossServers) {
   const std::string id = "b";
   EXPECT_EQ(hulls_->registry().records().FindBodies(std::span(&id, 1)).bodies[0]->record().revision,
             again->body.record.revision);
-  const auto deleted = PostgresRegistry::Wait<uint64_t>([&](Reply<uint64_t> done) {
-    hulls_->registry().changes().Delete("body", "b", std::nullopt, std::move(done));
+  const auto deleted = PostgresRegistry::Wait<uint64_t>([&](const Reply<uint64_t>& done) {
+    hulls_->registry().changes().Delete("body", "b", std::nullopt, done);
   });
   EXPECT_TRUE(deleted.ok()) << deleted.status();
   EXPECT_TRUE(other->Create("b").ok());
@@ -358,8 +358,8 @@ TEST_F(PostgresShared, WatchesReportIdsThatBecameABodyOrAHull) {
   const auto watch_both = feed.Open({.bodies = true, .lists_existing = false}, {}, [] {});
   ASSERT_TRUE(watch_hulls.ok() && watch_both.ok());
   const auto delete_body = [&](const std::string& id) {
-    return PostgresRegistry::Wait<uint64_t>([&](Reply<uint64_t> done) {
-      other->registry().changes().Delete("body", id, std::nullopt, std::move(done));
+    return PostgresRegistry::Wait<uint64_t>([&](const Reply<uint64_t>& done) {
+      other->registry().changes().Delete("body", id, std::nullopt, done);
     });
   };
   ASSERT_TRUE(other->Delete("was-hull").ok());
