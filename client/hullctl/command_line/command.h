@@ -109,8 +109,9 @@ class Command {
   Option AddParsed(const std::string& name, Parse parse, T* value, const std::string& help) {
     const auto take = [=](const std::string& text) {
       auto parsed = parse(text);
-      if (parsed.ok()) *value = *std::move(parsed);
-      return parsed.status();
+      if (!parsed.ok()) return parsed.status();
+      *value = *std::move(parsed);
+      return absl::OkStatus();
     };
     return AddParsed(name, take, help);
   }
@@ -119,6 +120,7 @@ class Command {
   Option AddChoice(const std::string& name, const std::vector<std::pair<const char*, T>>& choices,
                    T* value, const std::string& help) {
     std::vector<std::string> names;
+    names.reserve(choices.size());
     for (const auto& [choice, meaning] : choices) names.emplace_back(choice);
     const auto take = [=](const std::string& text) {
       for (const auto& [choice, meaning] : choices) {

@@ -23,10 +23,10 @@ constexpr int kMainLimits = 5;
 // their fields.
 void AddLimits(const v1::Limits& limits, int first, int end, Table* table) {
   for (int i = first; i < end; ++i) {
-    const google::protobuf::FieldDescriptor* const field = limits.GetDescriptor()->field(i);
+    const google::protobuf::FieldDescriptor* const field = v1::Limits::descriptor()->field(i);
     const std::string name = absl::StrReplaceAll(field->name(), {{"_", " "}});
     if (field->message_type() == nullptr) {
-      table->Row({name, absl::StrCat(limits.GetReflection()->GetUInt64(limits, field))});
+      table->Row({name, absl::StrCat(v1::Limits::GetReflection()->GetUInt64(limits, field))});
     } else if (limits.has_max_request_time()) {
       table->Row({name, DurationText(limits.max_request_time())});
     }

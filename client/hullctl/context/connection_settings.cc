@@ -7,8 +7,9 @@
 #include <cstring>
 #include <fstream>
 #include <iterator>
-#include <vector>
+#include <utility>
 
+#include "client/client.h"
 #include "client/formats/text_number.h"
 
 namespace hulld {

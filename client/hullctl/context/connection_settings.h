@@ -5,6 +5,9 @@
 
 #include <map>
 #include <string>
+#include <vector>
+
+#include "client/connection_security.h"
 
 namespace hulld {
 

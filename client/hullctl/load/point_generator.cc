@@ -34,8 +34,10 @@ Point InCube(Xoshiro256* random) {
 }
 
 Point OnLattice(uint64_t index, uint64_t side) {
-  return {static_cast<double>(index % side), static_cast<double>(index / side % side),
-          static_cast<double>(index / side / side)};
+  const uint64_t row = index / side;
+  const uint64_t layer = row / side;
+  return {static_cast<double>(index % side), static_cast<double>(row % side),
+          static_cast<double>(layer)};
 }
 
 }  // namespace

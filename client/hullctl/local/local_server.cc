@@ -17,8 +17,6 @@
 
 #include "client/base/status_macros.h"
 
-extern char** environ;
-
 namespace hulld {
 namespace {
 
@@ -116,6 +114,7 @@ absl::StatusOr<int> LocalServer::Spawn(const std::string& program) {
                                         "--drain-timeout",
                                         "1"};
   std::vector<char*> pointers;
+  pointers.reserve(arguments.size() + 1);
   for (std::string& argument : arguments) pointers.push_back(argument.data());
   pointers.push_back(nullptr);
   posix_spawn_file_actions_t files;

@@ -4,6 +4,7 @@
 #include <absl/status/status.h>
 #include <google/protobuf/message.h>
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -34,6 +35,7 @@ std::string JsonArray(const std::vector<std::string>& values);
 template <typename Items, typename JsonOf>
 std::string JsonArray(const Items& items, const JsonOf& json_of) {
   std::vector<std::string> values;
+  values.reserve(static_cast<size_t>(items.size()));
   for (const auto& item : items) values.push_back(json_of(item));
   return JsonArray(values);
 }

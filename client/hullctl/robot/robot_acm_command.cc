@@ -74,6 +74,7 @@ struct Tally {
 std::vector<DisabledPair> Judge(const std::set<LinkPair>& adjacent,
                                 const std::map<LinkPair, Tally>& tallies, uint64_t samples) {
   std::vector<DisabledPair> pairs;
+  pairs.reserve(adjacent.size() + tallies.size());
   for (const LinkPair& links : adjacent) pairs.push_back({links, "Adjacent"});
   for (const auto& [links, tally] : tallies) {
     if (tally.colliding == 0) pairs.push_back({links, "Never"});

@@ -346,6 +346,7 @@ class SceneParser {
     const auto found = among.find(name);
     if (found != among.end()) return found->second;
     std::vector<std::string> known;
+    known.reserve(among.size());
     for (const auto& [key, value] : among) known.push_back(key);
     const std::string hint = Suggestion(name, known);
     return yaml_.ErrorAt(node, absl::StrCat(what, " ", Quoted(name), " is not defined under ",

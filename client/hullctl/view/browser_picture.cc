@@ -19,8 +19,6 @@
 #include "client/base/status_macros.h"
 #include "client/hullctl/local/local_server.h"
 
-extern char** environ;
-
 namespace hulld {
 namespace {
 
@@ -70,6 +68,7 @@ class TemporaryFolder {
 // Runs a program to completion, with its output in two files; returns true if it started.
 bool RunToEnd(std::vector<std::string> arguments, const std::string& out, const std::string& err) {
   std::vector<char*> pointers;
+  pointers.reserve(arguments.size() + 1);
   for (std::string& argument : arguments) pointers.push_back(argument.data());
   pointers.push_back(nullptr);
   posix_spawn_file_actions_t actions;
