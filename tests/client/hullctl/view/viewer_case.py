@@ -33,7 +33,8 @@ class ViewerCase(unittest.TestCase):
         cls.hulld.stop()
 
     def setUp(self):
-        self.browser.resize(1440, 900)
+        # Small, because the processor computes every pixel.
+        self.browser.resize(960, 600)
         self.browser.problems()
 
     def tearDown(self):
