@@ -4,7 +4,10 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <chrono>
 #include <iterator>
+#include <map>
+#include <string>
 #include <utility>
 
 #include "core/base/status_macros.h"
@@ -297,16 +300,33 @@ absl::StatusOr<bool> PostgresStore::SharedOutcome(uint64_t batch) {
 
 // Ends sessions that hold the commit lock without sending anything, such as the session of a server
 // that stalls while sending a batch: PostgreSQL has timeouts between transactions and between
-// batches of statements, but not within a batch.
+// batches of statements, but not within a batch. The database's clock may jump, so its times only
+// identify the state of a session; this server measures how long that state lasts.
 absl::Status PostgresStore::EndStuckTransactions() {
-  return keeper_session_
-      ->Run(absl::StrCat(
-          "SELECT pg_terminate_backend(a.pid) FROM pg_locks l JOIN pg_stat_activity a USING (pid) "
-          "WHERE l.relation = 'hulld.store'::regclass AND l.mode = 'RowShareLock' AND l.granted "
-          "AND a.datname = current_database() AND a.usename = current_user "
-          "AND a.wait_event = 'ClientRead' AND a.state_change < now() - interval '",
-          options_.send_timeout.count(), " ms'"))
-      .status();
+  constexpr char kHolders[] =
+      "FROM pg_locks l JOIN pg_stat_activity a USING (pid) "
+      "WHERE l.relation = 'hulld.store'::regclass AND l.mode = 'RowShareLock' AND l.granted "
+      "AND a.datname = current_database() AND a.usename = current_user "
+      "AND a.wait_event = 'ClientRead'";
+  HULLD_ASSIGN_OR_RETURN(const Rows rows,
+                         keeper_session_->Run(absl::StrCat(
+                             "SELECT concat_ws(' ', a.pid, a.state_change) ", kHolders)));
+  const std::map<std::string, std::chrono::steady_clock::time_point> known =
+      std::exchange(stalled_since_, {});
+  const auto now = std::chrono::steady_clock::now();
+  for (int i = 0; i < rows.count(); ++i) {
+    const std::string state(rows.at(i, 0));
+    const auto found = known.find(state);
+    const auto since = found != known.end() ? found->second : now;
+    stalled_since_[state] = since;
+    if (now - since < options_.send_timeout) continue;
+    HULLD_RETURN_IF_ERROR(
+        keeper_session_
+            ->Run(absl::StrCat("SELECT pg_terminate_backend(a.pid) ", kHolders,
+                               " AND concat_ws(' ', a.pid, a.state_change) = '", state, "'"))
+            .status());
+  }
+  return absl::OkStatus();
 }
 
 void PostgresStore::StartNotices() {

@@ -9,6 +9,7 @@
 #include <condition_variable>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -276,6 +277,9 @@ class PostgresStore : public Store, public PeerFeed {
   // Used only by the keeper while it runs.
   std::unique_ptr<Session> keeper_session_;
   bool has_lock_ = false;
+  // Shared: the sessions that EndStuckTransactions watches, by process and time of their last
+  // change of state, and when it first found them in this state.
+  std::map<std::string, std::chrono::steady_clock::time_point> stalled_since_;
   // Shared: the last batch found by the keeper.
   uint64_t polled_batch_ = 0;
   // Shared: created before the keeper starts.

@@ -667,29 +667,68 @@ TEST_F(PostgresShared, ARestoredDatabaseIsADifferentStoreForAllServers) {
   EXPECT_NE(hulls_->store().id(), id);
 }
 
-// Half of a batch has arrived, and nothing follows.
+// A session that holds the commit lock: half of a batch has arrived, and nothing follows.
+class StalledSession {
+ public:
+  explicit StalledSession(const std::string& conninfo) : session_(PQconnectdb(conninfo.c_str())) {
+    EXPECT_EQ(PQstatus(session_), CONNECTION_OK) << PQerrorMessage(session_);
+    EXPECT_EQ(PQenterPipelineMode(session_), 1);
+    for (const char* statement : {"BEGIN", "SELECT batch FROM hulld.store FOR UPDATE"}) {
+      EXPECT_EQ(PQsendQueryParams(session_, statement, 0, nullptr, nullptr, nullptr, nullptr, 0),
+                1);
+    }
+    EXPECT_EQ(PQsendFlushRequest(session_), 1);
+    EXPECT_EQ(PQflush(session_), 0);
+    // The session holds the lock after both answers; each answer ends with a null.
+    for (int answers = 0; answers < 2;) {
+      PGresult* const result = PQgetResult(session_);
+      if (result == nullptr) ++answers;
+      PQclear(result);
+    }
+  }
+  ~StalledSession() { PQfinish(session_); }
+  StalledSession(const StalledSession&) = delete;
+  StalledSession& operator=(const StalledSession&) = delete;
+
+ private:
+  PGconn* const session_;
+};
+
 TEST_F(PostgresShared, AServerStalledWithinABatchBlocksPeersOnlyBriefly) {
   options_.send_timeout = std::chrono::milliseconds(100);
   options_.heartbeat = std::chrono::milliseconds(50);
   Start();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
-  const std::string conninfo = cluster().Conninfo(database_, cluster().socket_directory());
-  PGconn* const stopped = PQconnectdb(conninfo.c_str());
-  ASSERT_EQ(PQstatus(stopped), CONNECTION_OK) << PQerrorMessage(stopped);
-  ASSERT_EQ(PQenterPipelineMode(stopped), 1);
-  for (const char* statement : {"BEGIN", "SELECT batch FROM hulld.store FOR UPDATE"}) {
-    ASSERT_EQ(PQsendQueryParams(stopped, statement, 0, nullptr, nullptr, nullptr, nullptr, 0), 1);
-  }
-  ASSERT_EQ(PQsendFlushRequest(stopped), 1);
-  ASSERT_EQ(PQflush(stopped), 0);
-  // The session holds the lock after both answers; each answer ends with a null.
-  for (int answers = 0; answers < 2;) {
-    PGresult* const result = PQgetResult(stopped);
-    if (result == nullptr) ++answers;
-    PQclear(result);
-  }
+  const StalledSession stalled(cluster().Conninfo(database_, cluster().socket_directory()));
   EXPECT_TRUE(hulls_->Put("h", {{9, 9, 9}}).ok());
-  PQfinish(stopped);
+}
+
+// The database's clock jumps by a day.
+TEST_F(PostgresShared, AStalledServerIsEndedWhateverTheClockOfTheDatabase) {
+  const auto set_clock = [this](const std::string& time) {
+    RunSql("ALTER FUNCTION pg_catalog.now() RENAME TO now_before");
+    RunSql("CREATE FUNCTION pg_catalog.now() RETURNS timestamptz LANGUAGE sql AS 'SELECT " + time +
+           "'");
+  };
+  options_.heartbeat = std::chrono::milliseconds(50);
+  options_.send_timeout = std::chrono::milliseconds(100);
+  Start();
+  ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
+  const std::string conninfo = cluster().Conninfo(database_, cluster().socket_directory());
+  {
+    set_clock("clock_timestamp() - interval ''1 day''");
+    const StalledSession stalled(conninfo);
+    EXPECT_TRUE(hulls_->Put("h", {{9, 9, 9}}).ok());
+  }
+  // A server that may still send the rest of its batch keeps the lock.
+  options_.send_timeout = std::chrono::hours(1);
+  options_.lock_timeout = std::chrono::milliseconds(500);
+  Start();
+  RunSql("DROP FUNCTION pg_catalog.now()");
+  RunSql("ALTER FUNCTION pg_catalog.now_before() RENAME TO now");
+  set_clock("clock_timestamp() + interval ''1 day''");
+  const StalledSession slow(conninfo);
+  EXPECT_TRUE(absl::IsUnavailable(hulls_->Put("h", {{-9, 9, 9}}).status()));
 }
 
 TEST_F(PostgresShared, AServerTooFarBehindStops) {
