@@ -74,6 +74,24 @@ absl::StatusOr<Migration> Migration::Read(Store& source, Progress progress) {
   return migration;
 }
 
+// A database may have lost whole rows, for example in a partial restore.
+absl::Status Migration::CheckSource() const {
+  const StoreTotals totals = source_->totals();
+  if (source_->supports_lookup() &&
+      (hulls_.size() != totals.hulls || bodies_.size() != totals.bodies)) {
+    return absl::DataLossError(absl::StrCat("the source contains ", hulls_.size(), " hulls and ",
+                                            bodies_.size(), " bodies, not ", totals.hulls, " and ",
+                                            totals.bodies, " as it states; restore a backup"));
+  }
+  uint64_t revision = 0;
+  for (const StoredHull& hull : hulls_) revision = std::max(revision, hull.record.revision);
+  for (const StoredBody& body : bodies_) revision = std::max(revision, body.record.revision);
+  if (revision <= as_of_.revision) return absl::OkStatus();
+  return absl::DataLossError(absl::StrCat("the source is at revision ", as_of_.revision,
+                                          ", but contains a change of revision ", revision,
+                                          "; restore a backup"));
+}
+
 // Resumes an unfinished migration if it copied the current state of this source. Restarts one that
 // copied an earlier state.
 absl::Status Migration::Prepare(MigrationTarget& target) {
@@ -95,7 +113,18 @@ absl::Status Migration::Prepare(MigrationTarget& target) {
       target.store().revision(), " with ", held, " hulls and bodies; use an empty destination"));
 }
 
+absl::StatusOr<bool> Migration::IsFinished(MigrationTarget& target) const {
+  HULLD_ASSIGN_OR_RETURN(const std::optional<MigrationSource> mark, target.ReadMark());
+  const uint64_t revision = target.store().revision();
+  if (mark.has_value() || revision == 0 || revision != as_of_.revision) return false;
+  const absl::Status compared = Compare(target.store());
+  if (absl::IsDataLoss(compared)) return false;
+  if (!compared.ok()) return compared;
+  return true;
+}
+
 absl::StatusOr<MigrationCounts> Migration::CopyTo(MigrationTarget& target) {
+  HULLD_RETURN_IF_ERROR(CheckSource());
   HULLD_RETURN_IF_ERROR(Prepare(target));
   // Greatest IDs in the target: its hulls and bodies are contiguous up to these.
   std::string last_hull;

@@ -71,8 +71,13 @@ class Migration {
   // Copies the hulls and bodies missing in the target, each as a whole, in byte order of the IDs.
   // An interrupted run can therefore be resumed. FAILED_PRECONDITION, without any change: the
   // target is a complete store, or belongs to a migration from another store. DATA_LOSS: a hull of
-  // the source is damaged. Other errors: as the target's.
+  // the source is damaged, or the source lacks records or has records later than its revision.
+  // Other errors: as the target's.
   absl::StatusOr<MigrationCounts> CopyTo(MigrationTarget& target);
+
+  // Returns true if the target is a finished copy of the source's current state. Compares both
+  // stores if they have the same revision.
+  absl::StatusOr<bool> IsFinished(MigrationTarget& target) const;
 
   // Reads both stores back and compares them. DATA_LOSS, naming the first hull or body that
   // differs: its record and revisions, its vertices bit by bit, its writers' sequences, its
@@ -84,6 +89,7 @@ class Migration {
  private:
   Migration(Store& source, Progress progress);
 
+  absl::Status CheckSource() const;
   absl::Status Prepare(MigrationTarget& target);
   absl::StatusOr<std::vector<Change>> ChangesOf(const StoredHull& hull) const;
   absl::StatusOr<std::vector<Change>> ChangesOf(const StoredBody& body) const;

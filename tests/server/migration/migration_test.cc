@@ -288,15 +288,32 @@ TEST_P(MigrationTest, ASourceWithChangedCountsIsCopiedAgain) {
   ExpectSame(*from_->Serve(), *to_->Serve());
 }
 
+// As after a run that was killed before it reported the end.
+TEST_P(MigrationTest, AFinishedCopyIsRecognized) {
+  FillSource();
+  ASSERT_EQ(Migrate(*from_, *to_).code, 0);
+  const std::string id = to_->Serve()->store().id();
+  const Ran ran = Migrate(*from_, *to_);
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr("all records match"));
+  EXPECT_THAT(ran.out, HasSubstr("store " + id));
+  // Same revision, but another count.
+  { ASSERT_TRUE(from_->Serve()->Put("grown", {{0.5, 0.5, 0.5}}).ok()); }
+  const Ran changed = Migrate(*from_, *to_);
+  EXPECT_EQ(changed.code, 2);
+  EXPECT_THAT(changed.err, HasSubstr("the destination is not empty"));
+}
+
 TEST_P(MigrationTest, OnlyAnEmptyDestinationIsAccepted) {
   ASSERT_TRUE(from_->Serve()->Put("h", CubeCorners()).ok());
   // A store created by a server that never held data is accepted.
   { to_->Serve(); }
   ASSERT_EQ(Migrate(*from_, *to_).code, 0);
+  ASSERT_TRUE(to_->Serve()->Put("h", {{9, 9, 9}}).ok());
   const Ran ran = Migrate(*from_, *to_);
   EXPECT_EQ(ran.code, 2);
   EXPECT_THAT(ran.err, HasSubstr("the destination is not empty: it is store "));
-  EXPECT_EQ(to_->Serve()->View("h")->record.vertex_count, 8);
+  EXPECT_EQ(to_->Serve()->View("h")->record.counts.received, 9);
   // A store that was emptied is refused: its clients know its revisions.
   ASSERT_TRUE(to_->Serve()->Delete("h").ok());
   EXPECT_EQ(Migrate(*from_, *to_).code, 2);
@@ -358,6 +375,31 @@ TEST_P(MigrationTest, DifferencesAreFound) {
                 r.Put("again", {{9, 9, 9}}).IgnoreError();
               }),
               HasSubstr("\"again\" differs in the copy: its record"));
+}
+
+// Each value of the source is whole.
+TEST(MigrationOfADatabase, LostRowsAreFound) {
+  if (!PostgresCluster::IsInstalled()) GTEST_SKIP() << PostgresCluster::kMissing;
+  const StorePlace from("postgres");
+  {
+    const auto hulls = from.Serve();
+    ASSERT_TRUE(hulls->Put("h", CubeCorners()).ok());
+    ASSERT_TRUE(hulls->Put("other", CubeCorners()).ok());
+  }
+  const auto expect_refused = [&](const std::string& sql, const std::string& finding) {
+    PostgresCluster::Shared().RunSql(from.database(), sql);
+    const StorePlace to("rocksdb");
+    const Ran ran = Migrate(from, to);
+    EXPECT_EQ(ran.code, 1) << ran.out;
+    EXPECT_THAT(ran.err, HasSubstr(finding));
+    EXPECT_EQ(to.Serve()->store().revision(), 0);
+  };
+  const std::string revision =
+      PostgresCluster::Shared().RunSql(from.database(), "SELECT revision FROM hulld.store").at(0);
+  expect_refused("UPDATE hulld.store SET revision = 1", "a change of revision " + revision);
+  expect_refused("UPDATE hulld.store SET revision = " + revision +
+                     "; DELETE FROM hulld.hulls WHERE hull_id = 'h'",
+                 "the source contains 1 hulls and 0 bodies, not 2 and 0");
 }
 
 TEST_P(MigrationTest, TheCommandLineIsChecked) {
