@@ -77,9 +77,16 @@ CollisionWatch::~CollisionWatch() {
 }
 
 absl::StatusOr<v1::WatchCollisionsResponse> CollisionWatch::Next() {
-  Deadline deadline;
   RetryPolicy retry = retry_;
+  Deadline deadline;
+  if (!connected_) deadline = retry.Now() + reconnect_timeout_;
   if (connected_) retry.max_attempts = std::numeric_limits<int>::max();
+  if (!retry.wait) {
+    retry.wait = [this](std::chrono::milliseconds backoff) {
+      std::unique_lock lock(cancel_mutex_);
+      cancellation_.wait_for(lock, backoff, [this] { return cancelled_; });
+    };
+  }
   for (int failures = 0;;) {
     const bool is_new = call_ == nullptr;
     if (is_new) call_ = Open();
@@ -94,9 +101,8 @@ absl::StatusOr<v1::WatchCollisionsResponse> CollisionWatch::Next() {
     }
     const absl::Status status = Close(*call_);
     call_.reset();
-    // The deadline starts at the first failure, because the watch may have been quiet for hours
-    // before.
-    if (failures == 0) deadline = retry.Now() + reconnect_timeout_;
+    // A lost connection starts the deadline, because the watch may have been quiet for hours.
+    if (failures == 0 && connected_) deadline = retry.Now() + reconnect_timeout_;
     if (!MayRetry(status) || !WaitBeforeRetry(retry, ++failures, deadline, status)) return status;
   }
 }
@@ -153,6 +159,7 @@ absl::Status CollisionWatch::Close(Call& call) {
 void CollisionWatch::Cancel() {
   const std::lock_guard lock(cancel_mutex_);
   cancelled_ = true;
+  cancellation_.notify_all();
   if (cancelled_call_ != nullptr) cancelled_call_->context.TryCancel();
 }
 

@@ -6,6 +6,7 @@
 #include <grpcpp/grpcpp.h>
 
 #include <chrono>
+#include <condition_variable>
 #include <cstdint>
 #include <memory>
 #include <mutex>
@@ -23,8 +24,8 @@ namespace hulld {
 // by one thread, not necessarily the same one, and Cancel by any thread.
 class CollisionWatch {
  public:
-  // Next connects. reconnect_timeout: limits the attempts to reconnect to a lost server. The first
-  // call and refused calls are retried as `retry` specifies.
+  // Next connects. reconnect_timeout: limits the attempts to connect, and to reconnect to a lost
+  // server. The first call and refused calls are retried as `retry` specifies.
   CollisionWatch(std::shared_ptr<v1::CollisionService::Stub> stub, v1::CollisionWatchOpen open,
                  RetryPolicy retry, std::chrono::milliseconds reconnect_timeout);
   // Cancels the watch.
@@ -41,7 +42,7 @@ class CollisionWatch {
   // have seven numbers for each placement.
   absl::Status Update(const v1::CollisionWatchUpdate& update);
 
-  // Makes the current and every later call of Next return.
+  // Makes the current and every later call of Next return promptly.
   void Cancel();
 
  private:
@@ -79,6 +80,7 @@ class CollisionWatch {
   std::mutex cancel_mutex_;
   std::shared_ptr<Call> cancelled_call_;
   bool cancelled_ = false;
+  std::condition_variable cancellation_;
 };
 
 }  // namespace hulld

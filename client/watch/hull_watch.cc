@@ -20,9 +20,16 @@ HullWatch::~HullWatch() {
 }
 
 absl::StatusOr<v1::WatchHullsResponse> HullWatch::Next() {
-  Deadline deadline;
   RetryPolicy retry = retry_;
+  Deadline deadline;
+  if (!connected_) deadline = retry.Now() + reconnect_timeout_;
   if (connected_) retry.max_attempts = std::numeric_limits<int>::max();
+  if (!retry.wait) {
+    retry.wait = [this](std::chrono::milliseconds backoff) {
+      std::unique_lock lock(mutex_);
+      cancellation_.wait_for(lock, backoff, [this] { return cancelled_; });
+    };
+  }
   for (int failures = 0;;) {
     const bool is_new = call_ == nullptr;
     Call* const call = is_new ? Open() : call_.get();
@@ -38,9 +45,8 @@ absl::StatusOr<v1::WatchHullsResponse> HullWatch::Next() {
       return message;
     }
     const absl::Status status = Close();
-    // The deadline starts at the first failure, because the watch may have been quiet for hours
-    // before.
-    if (failures == 0) deadline = retry.Now() + reconnect_timeout_;
+    // A lost connection starts the deadline, because the watch may have been quiet for hours.
+    if (failures == 0 && connected_) deadline = retry.Now() + reconnect_timeout_;
     if (!MayRetry(status) || !WaitBeforeRetry(retry, ++failures, deadline, status)) return status;
   }
 }
@@ -64,6 +70,7 @@ absl::Status HullWatch::Close() {
 void HullWatch::Cancel() {
   const std::lock_guard lock(mutex_);
   cancelled_ = true;
+  cancellation_.notify_all();
   if (call_ != nullptr) call_->context.TryCancel();
 }
 

@@ -5,6 +5,7 @@
 #include <grpcpp/grpcpp.h>
 
 #include <chrono>
+#include <condition_variable>
 #include <memory>
 #include <mutex>
 
@@ -19,8 +20,8 @@ namespace hulld {
 // thread, and Cancel by any thread.
 class HullWatch {
  public:
-  // Next connects. reconnect_timeout: limits the attempts to reconnect to a lost server. The first
-  // call and refused calls are retried as `retry` specifies.
+  // Next connects. reconnect_timeout: limits the attempts to connect, and to reconnect to a lost
+  // server. The first call and refused calls are retried as `retry` specifies.
   HullWatch(std::shared_ptr<v1::HullService::Stub> stub, v1::WatchHullsRequest request,
             RetryPolicy retry, std::chrono::milliseconds reconnect_timeout);
   // Cancels the watch.
@@ -32,7 +33,7 @@ class HullWatch {
   // contract.
   absl::StatusOr<v1::WatchHullsResponse> Next();
 
-  // Makes the current and every later call of Next return.
+  // Makes the current and every later call of Next return promptly.
   void Cancel();
 
  private:
@@ -58,6 +59,7 @@ class HullWatch {
   // Guarded by the mutex where it changes.
   std::unique_ptr<Call> call_;
   bool cancelled_ = false;
+  std::condition_variable cancellation_;
 };
 
 }  // namespace hulld

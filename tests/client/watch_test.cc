@@ -6,8 +6,11 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <filesystem>
 #include <functional>
+#include <future>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -129,7 +132,7 @@ TEST_F(Watches, WatchesOfHullsResume) {
 }
 
 // The reconnect timeout applies to a missing server, not to an idle one: it starts with the first
-// failure, so the clock is unused before that.
+// failure after the connection, so the clock is unused in between.
 TEST_F(Watches, LongQuietWatchesContinue) {
   UseOwnClock();
   const Client client(options_);
@@ -137,7 +140,7 @@ TEST_F(Watches, LongQuietWatchesContinue) {
   const auto hulls = client.WatchHulls({});
   auto hull_message = hulls->Next();
   while (hull_message.ok() && !hull_message->synced()) hull_message = hulls->Next();
-  EXPECT_EQ(clock_readings_, 0);
+  EXPECT_EQ(std::exchange(clock_readings_, 0), 1);
   now_ += std::chrono::hours(1);
   Lose([] {});
   hull_message = hulls->Next();
@@ -149,7 +152,7 @@ TEST_F(Watches, LongQuietWatchesContinue) {
   *open.add_placements() = server::PlacementOf("a", 0.5);
   const auto pairs = client.WatchCollisions(open);
   EXPECT_THAT(Events(Round(*pairs)), ElementsAre("ENTER 0 1"));
-  EXPECT_EQ(clock_readings_, 0);
+  EXPECT_EQ(std::exchange(clock_readings_, 0), 1);
   now_ += std::chrono::hours(1);
   Lose([] {});
   const auto pair_message = pairs->Next();
@@ -175,6 +178,78 @@ TEST_F(Watches, WatchesOfAnUnreachableServerEndAfterTheirTimeout) {
   EXPECT_EQ(std::exchange(waits_, 0), 4);
   EXPECT_TRUE(absl::IsUnavailable(pairs->Next().status()));
   EXPECT_EQ(waits_, 4);
+}
+
+// Watches of a server that refuses each of them.
+class RefusedWatches : public ::testing::Test {
+ protected:
+  RefusedWatches() {
+    grpc::ServerBuilder builder;
+    int port = 0;
+    builder.AddListeningPort("127.0.0.1:0", grpc::InsecureServerCredentials(), &port);
+    builder.RegisterService(&hulls_);
+    builder.RegisterService(&collisions_);
+    server_ = builder.BuildAndStart();
+    options_.server = absl::StrCat("127.0.0.1:", port);
+  }
+
+  // Opens a watch of each kind, and passes functions that call its Next and its Cancel.
+  void ForEachKind(const std::function<void(const std::function<absl::Status()>&,
+                                            const std::function<void()>&)>& run) {
+    const Client client(options_);
+    const auto hulls = client.WatchHulls({});
+    run([&] { return hulls->Next().status(); }, [&] { hulls->Cancel(); });
+    calls_ = 0;
+    const auto pairs = client.WatchCollisions({});
+    run([&] { return pairs->Next().status(); }, [&] { pairs->Cancel(); });
+  }
+
+  ClientOptions options_;
+  std::atomic<int> calls_ = 0;
+
+ private:
+  struct Hulls final : v1::HullService::Service {
+    explicit Hulls(std::atomic<int>& count) : calls(count) {}
+    grpc::Status WatchHulls(grpc::ServerContext*, const v1::WatchHullsRequest*,
+                            grpc::ServerWriter<v1::WatchHullsResponse>*) override {
+      ++calls;
+      return {grpc::StatusCode::UNAVAILABLE, "refused"};
+    }
+    std::atomic<int>& calls;
+  };
+  struct Collisions final : v1::CollisionService::Service {
+    explicit Collisions(std::atomic<int>& count) : calls(count) {}
+    grpc::Status WatchCollisions(grpc::ServerContext*,
+                                 grpc::ServerReaderWriter<v1::WatchCollisionsResponse,
+                                                          v1::WatchCollisionsRequest>*) override {
+      ++calls;
+      return {grpc::StatusCode::UNAVAILABLE, "refused"};
+    }
+    std::atomic<int>& calls;
+  };
+
+  Hulls hulls_{calls_};
+  Collisions collisions_{calls_};
+  std::unique_ptr<grpc::Server> server_;
+};
+
+TEST_F(RefusedWatches, EndAfterTheirTimeoutIncludingTheFirstAttempt) {
+  options_.timeout = std::chrono::seconds(5);
+  // The first attempt takes 6 s.
+  options_.retry.now = [this] { return Deadline(std::chrono::seconds(calls_ == 0 ? 0 : 6)); };
+  options_.retry.wait = [](std::chrono::milliseconds) { ADD_FAILURE(); };
+  ForEachKind([](const auto& next, const auto&) { EXPECT_TRUE(absl::IsUnavailable(next())); });
+}
+
+TEST_F(RefusedWatches, ACancelledWatchDoesNotWaitForItsRetry) {
+  options_.timeout = std::chrono::hours(1000);
+  options_.retry.initial_backoff = options_.retry.max_backoff = std::chrono::hours(10);
+  ForEachKind([this](const auto& next, const auto& cancel) {
+    auto ended = std::async(std::launch::async, next);
+    while (calls_ == 0) std::this_thread::yield();
+    cancel();
+    EXPECT_TRUE(absl::IsCancelled(ended.get()));
+  });
 }
 
 // Cubes of side 1 along x, as listed and as packed placements.
