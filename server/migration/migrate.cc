@@ -126,8 +126,8 @@ absl::Status Run(const Place& from, const Place& to, std::ostream& out, std::ost
   if (!migration.ok()) return Explain(from, migration.status());
   HULLD_ASSIGN_OR_RETURN(const bool is_finished, migration->IsFinished(**target));
   if (is_finished) {
-    out << "nothing to copy: all records match; an earlier run made " << to.Describe() << " store "
-        << (*target)->store().id() << "\n";
+    out << "nothing to copy: " << to.Describe() << " already contains the copy, store "
+        << (*target)->store().id() << "; all records match\n";
     return absl::OkStatus();
   }
   absl::StatusOr<MigrationCounts> counts = migration->CopyTo(**target);
@@ -168,10 +168,9 @@ int RunMigrate(const std::vector<std::string>& arguments, std::ostream& out, std
         "The source: a database of --store=postgres"},
        {"--to-data-dir", &to.data_dir, "The destination: a directory, created if missing"},
        {"--to-postgres-conninfo-file", &to.conninfo_file, "The destination: an empty database"}},
-      "Run the same command again to resume an interrupted run, or to verify a finished copy\nthat "
-      "no "
-      "server has changed. Revisions and writers' sequences "
-      "are\nkept; the copy is a new store with its own ID.\n"
+      "Run the same command again to resume an interrupted run, or to verify a finished copy\n"
+      "that no server has changed. Revisions and writers' sequences are kept; the copy is a new\n"
+      "store with its own ID.\n"
       "Exit status: 0 everything is copied and verified, 1 it failed and can be resumed, 2 it "
       "was\nrefused, and nothing was changed."};
   if (const std::optional<int> exit = command.Parse(arguments, out, err)) return *exit;
