@@ -19,9 +19,8 @@ class ObjWalk {
     std::string continued;
     for (std::string_view line; source_->ReadLine(&line);) {
       const std::string_view content = Trim(line);
-      // Comments often contain Windows paths, which may end in a backslash.
-      const bool is_comment = continued.empty() && !content.empty() && content.front() == '#';
-      if (!is_comment && !content.empty() && content.back() == '\\') {
+      if (content.ends_with('\\') && WithoutComment(content) == content &&
+          MayContinue(continued.empty() ? content : continued)) {
         continued.append(content.substr(0, content.size() - 1)).push_back(' ');
         if (continued.size() <= ByteSource::kMaxLineBytes) continue;
         return source_->ErrorAtLine("the continued line is longer than 16 MiB");
@@ -36,6 +35,14 @@ class ObjWalk {
   }
 
  private:
+  // Returns true if a backslash continues the statement. Names and comments often contain Windows
+  // paths, which may end in a backslash; the next line is then a statement of its own.
+  static bool MayContinue(std::string_view statement) {
+    std::string_view keyword = NextToken(&statement);
+    keyword = keyword.substr(0, keyword.find('\\'));
+    return keyword == "v" || keyword == "f";
+  }
+
   absl::Status TakeStatement(std::string_view rest) {
     const std::string_view keyword = NextToken(&rest);
     if (keyword == "v") {

@@ -30,6 +30,15 @@ TEST(ObjFile, ABackslashContinuesALine) {
               ElementsAre(1, 2, 3, 4, 5, 6));
 }
 
+// The next vertex was lost.
+TEST(ObjFile, ABackslashEndsNamesAndComments) {
+  EXPECT_THAT(
+      ReadText("mtllib c:\\a\\\nv 1 2 3 # c:\\b\\\nv 4 5 6\ng d:\\c\\\nv 7 8 9\n# \\\nv 0 0 0",
+               PointFormat::kObj)
+          .xyz(),
+      ElementsAre(1, 2, 3, 4, 5, 6, 7, 8, 9, 0, 0, 0));
+}
+
 TEST(ObjFile, ErrorsNameFileAndLine) {
   EXPECT_EQ(ReadText("v 1 2 3\n\nv 1 abc 3\n", PointFormat::kObj).error(),
             "FILE:3: \"abc\" is not a number");
