@@ -1,6 +1,7 @@
 #include "client/formats/gltf/gltf_document.h"
 
 #include <absl/strings/escaping.h>
+#include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 #include <google/protobuf/util/json_util.h>
 
@@ -28,6 +29,17 @@ bool IsKnownExtension(const std::string& name) {
     if (name.rfind(prefix, 0) == 0) return true;
   }
   return false;
+}
+
+// Returns the text with a question mark instead of each byte that is not UTF-8. Some exporters
+// write names in other encodings.
+std::string ReplaceInvalidUtf8(std::string text) {
+  for (size_t at = 0; at < text.size();) {
+    const size_t length = Utf8Length(std::string_view(text).substr(at));
+    if (length == 0) text[at] = '?';
+    at += std::max<size_t>(length, 1);
+  }
+  return text;
 }
 
 }  // namespace
@@ -130,7 +142,8 @@ void GltfDocument::ReadContainer() {
   if (!ok()) return;
   // Some writers pad the chunk with zeros instead of spaces.
   while (!json.empty() && json.back() == '\0') json.pop_back();
-  const auto parsed = google::protobuf::util::JsonStringToMessage(json, &root_);
+  const auto parsed =
+      google::protobuf::util::JsonStringToMessage(ReplaceInvalidUtf8(std::move(json)), &root_);
   if (!parsed.ok()) {
     Fail(absl::StrCat("is not valid glTF JSON: ",
                       JsonProblem({parsed.message().data(), parsed.message().size()})));
@@ -222,13 +235,9 @@ std::string GltfDocument::DataOf(const std::string& uri, const std::string& what
     Fail(absl::StrCat(what, ": the data URI has no comma"));
     return {};
   }
-  const std::string head = uri.substr(0, comma);
   std::string bytes = PercentDecoded(uri.substr(comma + 1));
-  constexpr std::string_view kBase64 = ";base64";
-  const bool base64 = head.size() >= kBase64.size() &&
-                      head.compare(head.size() - kBase64.size(), kBase64.size(), kBase64) == 0;
   std::string decoded;
-  if (!base64) return bytes;
+  if (!absl::EndsWithIgnoreCase(uri.substr(0, comma), ";base64")) return bytes;
   if (!absl::Base64Unescape(bytes, &decoded)) {
     Fail(absl::StrCat(what, ": the data URI is not base64"));
   }
@@ -236,10 +245,13 @@ std::string GltfDocument::DataOf(const std::string& uri, const std::string& what
 }
 
 std::string GltfDocument::FileOf(const std::string& uri, size_t size, const std::string& what) {
-  const std::string name = PercentDecoded(uri);
-  const std::filesystem::path path =
-      std::filesystem::path(source_->name()).parent_path() / std::filesystem::path(name);
+  std::string name = PercentDecoded(uri);
+  const std::filesystem::path folder = std::filesystem::path(source_->name()).parent_path();
   std::error_code error;
+  // Exporters on Windows may write its separator.
+  if (!std::filesystem::exists(folder / name, error))
+    std::replace(name.begin(), name.end(), '\\', '/');
+  const std::filesystem::path path = folder / name;
   const uintmax_t file_size = std::filesystem::file_size(path, error);
   if (uri.find("://") != std::string::npos || name.find('\0') != std::string::npos || error) {
     Fail(absl::StrCat(what, ": the file ", Quoted(name), " cannot be read",
@@ -266,7 +278,9 @@ GltfDocument::View GltfDocument::ViewOf(const Struct& object, size_t count, size
   const size_t view_offset = IntegerOf(view, "byteOffset").value_or(0);
   const size_t length = IntegerOf(view, "byteLength").value_or(0);
   const size_t offset = IntegerOf(object, "byteOffset").value_or(0);
-  const size_t stride = IntegerOf(view, "byteStride").value_or(size);
+  // Some exporters write 0 for the default.
+  const size_t written_stride = IntegerOf(view, "byteStride").value_or(0);
+  const size_t stride = written_stride == 0 ? size : written_stride;
   if (!ok()) return {};
   if (Find(ObjectOf(view, "extensions"), "EXT_meshopt_compression") != nullptr &&
       (buffer >= buffers_.size() || !buffers_[buffer])) {

@@ -178,9 +178,37 @@ TEST(GltfFile, BuffersMayBeFilesWithEscapedNames) {
   const std::string text =
       Replaced(Gltf(Bytes(kTriangle), kFloats), DataUri(Bytes(kTriangle)), escaped);
   EXPECT_EQ(ReadText(text, PointFormat::kGltf).counts.points, 3u);
+  EXPECT_EQ(Error(Replaced(text, escaped, ".\\\\" + escaped)), "");
   EXPECT_THAT(Error(Replaced(text, "%23", "%24")), HasSubstr("cannot be read"));
   EXPECT_THAT(Error(Replaced(text, R"("byteLength":36,"uri")", R"("byteLength":37,"uri")")),
               HasSubstr("declares 37 bytes"));
+}
+
+TEST(GltfFile, AStrideOfZeroMeansPackedElements) {
+  EXPECT_THAT(
+      ReadText(Gltf(Bytes(kTriangle), kFloats, "", "", R"(,"byteStride":0)"), PointFormat::kGltf)
+          .xyz(),
+      ElementsAre(0.1f, 0, 0, 1, 0, 0, 0, 2, 0));
+  EXPECT_THAT(Error(Gltf(Bytes(kTriangle), kFloats, "", "", R"(,"byteStride":4)")),
+              HasSubstr("reaches beyond its buffer"));
+}
+
+TEST(GltfFile, NamesNeedNotBeUtf8) {
+  const PointsRead read =
+      ReadText(Gltf(Bytes(kTriangle), kFloats, ",\"name\":\"\xa3\""), PointFormat::kGltf);
+  ASSERT_TRUE(read.status.ok()) << read.status;
+  EXPECT_EQ(read.counts.points, 3u);
+  EXPECT_EQ(Error(Gltf(Bytes(kTriangle), kFloats,
+                       ",\"name\":\"K\xf6rper \xe4\xbd\x93\",\"rotation\":[0,0,0,0]")),
+            "FILE: \"K?rper \xe4\xbd\x93\": a rotation is not a unit quaternion");
+}
+
+// The text of the base64 was read as positions.
+TEST(GltfFile, TheEncodingOfDataIsNamedInAnyCase) {
+  EXPECT_THAT(ReadText(Replaced(Gltf(Bytes(kTriangle), kFloats), ";base64,", ";BASE64,"),
+                       PointFormat::kGltf)
+                  .xyz(),
+              ElementsAre(0.1f, 0, 0, 1, 0, 0, 0, 2, 0));
 }
 
 TEST(GltfFile, SparseAccessorsReplacePositions) {
