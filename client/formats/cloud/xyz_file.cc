@@ -96,8 +96,8 @@ absl::Status ReadXyz(ByteSource* source, PointCollector* points) {
       if (first && !commented) commented = CsvHeaderInComment(*source, Trim(line));
       continue;
     }
-    if (first && commented && commented->columns != CsvLayout().columns &&
-        IsRowOf(*commented, line)) {
+    const bool has_other_columns = commented && commented->columns != CsvLayout().columns;
+    if (first && has_other_columns && IsRowOf(*commented, line)) {
       return ReadCsvRows(source, *commented, line, points);
     }
     if (first) {
@@ -114,6 +114,10 @@ absl::Status ReadXyz(ByteSource* source, PointCollector* points) {
       declared = count;
       found = 0;
       columns = 0;
+    } else if (declared && found == 0 && has_other_columns && IsRowOf(*commented, line)) {
+      return source->ErrorAtLine(
+          "the comment at the start names x, y, and z, but not as the first three columns, and a "
+          "number of points follows; remove that number");
     } else if (is_complete) {
       return source->ErrorAtLine(absl::StrCat("the scan has more lines than the ",
                                               Counted(*declared, "point"), " it declares"));

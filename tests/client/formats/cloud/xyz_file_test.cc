@@ -17,6 +17,16 @@ TEST(PtsFile, CountThenPointsWithIntensityAndColor) {
               ElementsAre(1, 2, 3, 4, 5, 6));
 }
 
+// z was read as x.
+TEST(PtsFile, ACountAfterACommentWithOtherColumnsIsAnError) {
+  EXPECT_EQ(
+      ReadText("//Z;Y;X;R\n1\n3;2;1;0\n", PointFormat::kXyz).error(),
+      "FILE:3: the comment at the start names x, y, and z, but not as the first three columns, "
+      "and a number of points follows; remove that number");
+  EXPECT_THAT(ReadText("// about x, then y, then z\n1\n1 2 3\n", PointFormat::kXyz).xyz(),
+              ElementsAre(1, 2, 3));
+}
+
 TEST(PtsFile, ReadsConsecutiveScans) {
   EXPECT_THAT(ReadText("1\n1 2 3 4\n0\n2\n4 5 6 7\n7 8 9 0\n", PointFormat::kXyz).xyz(),
               ElementsAre(1, 2, 3, 4, 5, 6, 7, 8, 9));
