@@ -2,6 +2,7 @@
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
+#include <absl/strings/str_replace.h>
 #include <absl/strings/str_split.h>
 
 #include <algorithm>
@@ -25,8 +26,10 @@ bool IsFile(const fs::path& path) {
 }
 
 // Returns the file `folder`/`name`. URIs may contain escapes such as %20, and so may file names.
+// Exporters on Windows may write its separator.
 std::optional<std::string> FileIn(const fs::path& folder, const std::string& name) {
-  for (const std::string& spelled : {name, PercentDecoded(name)}) {
+  for (const std::string& spelled :
+       {name, PercentDecoded(name), absl::StrReplaceAll(name, {{"\\", "/"}})}) {
     if (IsFile(folder / spelled)) return (folder / spelled).string();
   }
   return std::nullopt;

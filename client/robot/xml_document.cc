@@ -112,7 +112,9 @@ class TagWalk {
         !name.empty() && (absl::ascii_isalpha(static_cast<unsigned char>(name[0])) ||
                           name[0] == '_' || static_cast<unsigned char>(name[0]) >= 0x80);
     if (!starts_well) return Error("expected a name after <; in text, write &lt;");
-    if (name.rfind("xacro:", 0) == 0) {
+    // Macros needed no prefix before 2015.
+    const bool is_old_macro = open_.size() == 1 && (name == "include" || name == "macro");
+    if (name.rfind("xacro:", 0) == 0 || is_old_macro) {
       return Error(absl::StrCat("<", name, "> is a macro; expand the file with 'xacro' first"));
     }
     if (open_.empty() && ++roots_ > 1) return Error("a second root element");
@@ -170,6 +172,17 @@ class TagWalk {
   std::vector<Open> open_;
 };
 
+// Converts ISO 8859-1, the most common encoding of files that are not UTF-8.
+std::string Utf8FromLatin1(const std::string& text) {
+  std::string utf8;
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (byte >= 0x80) utf8 += static_cast<char>(0xC0 | byte >> 6);
+    utf8 += byte < 0x80 ? c : static_cast<char>(0x80 | (byte & 0x3F));
+  }
+  return utf8;
+}
+
 }  // namespace
 
 int XmlDocument::LineOf(pugi::xml_node element) const {
@@ -187,9 +200,9 @@ absl::StatusOr<std::unique_ptr<XmlDocument>> ParseXml(const std::string& text,
   if (absl::Status walked = TagWalk(text, name).Run(); !walked.ok()) return walked;
   auto document = std::make_unique<XmlDocument>();
   document->name = name;
-  document->text = text;
+  document->text = IsUtf8(text) ? text : Utf8FromLatin1(text);
   const pugi::xml_parse_result parsed = document->tree.load_buffer(
-      text.data(), text.size(), pugi::parse_default, pugi::encoding_utf8);
+      document->text.data(), document->text.size(), pugi::parse_default, pugi::encoding_utf8);
   if (!parsed) {
     return absl::InvalidArgumentError(
         absl::StrCat(name, ": not valid XML: ", parsed.description()));
@@ -210,7 +223,11 @@ absl::StatusOr<std::vector<double>> NumbersOf(const XmlDocument& document, pugi:
   std::string_view rest = text;
   for (std::string_view token; !(token = NextToken(&rest)).empty();) {
     const auto number = ParseFinite(token);
-    if (!number.ok()) return error(absl::StrCat(attribute, ": ", number.status().message()));
+    if (!number.ok()) {
+      const bool is_macro = text.find("${") != std::string_view::npos;
+      return error(absl::StrCat(attribute, ": ", number.status().message(),
+                                is_macro ? "; expand the file with 'xacro' first" : ""));
+    }
     numbers.push_back(*number);
   }
   if (numbers.size() == count) return numbers;

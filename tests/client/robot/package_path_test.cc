@@ -89,6 +89,14 @@ TEST_F(PackagePath, UrisMayContainEscapes) {
   EXPECT_EQ(Resolve("package://arm_description/my%20tool.stl"), percent);
 }
 
+TEST_F(PackagePath, PathsMayHaveTheSeparatorOfWindows) {
+  const std::string file = Make("ws/src/arm_description/urdf/meshes/a.stl");
+  EXPECT_EQ(Resolve("meshes\\a.stl"), file);
+  EXPECT_EQ(Resolve("package://arm_description/urdf\\meshes\\a.stl"), file);
+  const std::string backslash = Make("ws/src/arm_description/urdf/meshes\\a.stl");
+  EXPECT_EQ(Resolve("meshes\\a.stl"), backslash);
+}
+
 TEST_F(PackagePath, ErrorsListTheSearchedFolders) {
   EXPECT_THAT(Resolve("package://tool/a.stl"),
               testing::AllOf(HasSubstr("no folder of the package \"tool\" contains a.stl"),

@@ -176,6 +176,12 @@ TEST(UrdfFile, ErrorsNameLineAndElement) {
        "arm.urdf:19: </lnk> does not close <link> of line 12"},
       {{"</robot>", ""}, "the file ends before </robot>"},
       {{"<link name=\"flange\"/>", "<xacro:flange/>"}, "expand the file with 'xacro' first"},
+      {{"<link name=\"flange\"/>", "<macro name=\"flange\"/>"},
+       "<macro> is a macro; expand the file with 'xacro' first"},
+      {{"<link name=\"flange\"/>", "<include filename=\"flange.xacro\"/>"},
+       "<include> is a macro; expand the file with 'xacro' first"},
+      {{"axis xyz=\"0 1 0\"", "axis xyz=\"0 ${y} 0\""},
+       "arm.urdf:9: <axis> xyz: \"${y}\" is not a number; expand the file with 'xacro' first"},
       {{"<?xml version=\"1.0\"?>", "<!DOCTYPE robot>"},
        "arm.urdf:1: document types are not supported"},
       {{"<robot name=\"arm\">", "<robot>"}, "arm.urdf:2: <robot> lacks name"},
@@ -192,6 +198,14 @@ TEST(UrdfFile, ErrorsNameLineAndElement) {
   std::string deep;
   for (int i = 0; i < 100000; ++i) deep += "<a>";
   EXPECT_THAT(ErrorOf(deep), HasSubstr("nested deeper"));
+}
+
+TEST(UrdfFile, TextMayBeLatin1) {
+  const auto robot = ParseUrdf("<robot name=\"r\"><link name=\"K\xf6rper\"/></robot>", "arm.urdf");
+  ASSERT_TRUE(robot.ok()) << robot.status();
+  EXPECT_GE(robot->FindLink("K\xc3\xb6rper"), 0);
+  EXPECT_THAT(ErrorOf("<!-- \xf6\xf6\xf6\xf6 -->\n<robot name=\"r\">\n<link/></robot>"),
+              HasSubstr("arm.urdf:3: <link> lacks name"));
 }
 
 TEST(UrdfFile, JointsOfSeveralValuesAreNotMimicked) {

@@ -51,8 +51,9 @@ def resolve_file(
 
 
 def _file_in(folder: pathlib.Path, name: str) -> pathlib.Path | None:
-    """folder/name. URIs may contain escapes such as %20, and so may file names."""
-    for spelled in (name, urllib.parse.unquote(name)):
+    """folder/name. URIs may contain escapes such as %20, and so may file names. Exporters on Windows
+    may write its separator."""
+    for spelled in (name, urllib.parse.unquote(name), name.replace("\\", "/")):
         if (folder / spelled).is_file():
             return folder / spelled
     return None

@@ -55,7 +55,8 @@ class Element:
         words = self.get(name).split()
         for word in words:
             if not _NUMBER.fullmatch(word) or math.isinf(float(word)):
-                raise self.error(f"<{self.tag}> {name}: {word!r} is not a finite number")
+                hint = "; expand the file with 'xacro' first" if "${" in self.get(name) else ""
+                raise self.error(f"<{self.tag}> {name}: {word!r} is not a finite number{hint}")
         if len(words) != count:
             numbers = "number" if count == 1 else "numbers"
             raise self.error(f"<{self.tag}> {name} needs {count} {numbers}, got {len(words)}")
@@ -80,7 +81,9 @@ def read_xml(path: str | os.PathLike[str], root: str) -> Element:
 
     def start(tag: str, attributes: dict[str, str]) -> None:
         element = Element(source, tag, attributes, parser.CurrentLineNumber)
-        if tag.startswith("xacro:"):
+        # Macros needed no prefix before 2015.
+        old_macro = len(open_elements) == 2 and tag in ("include", "macro")
+        if tag.startswith("xacro:") or old_macro:
             raise element.error(f"<{tag}> is a macro; expand the file with 'xacro' first")
         if len(open_elements) > _MAX_DEPTH:
             raise element.error(f"elements are nested deeper than {_MAX_DEPTH}")

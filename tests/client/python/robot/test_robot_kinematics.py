@@ -169,6 +169,8 @@ def test_sizes_may_be_zero(write: Write, shape: str) -> None:
             '<xacro:m name="hand"/><link name="hand">',
             "11: <xacro:m> is a mac",
         ),
+        ('<link name="hand">', '<include filename="a"/><link name="hand">', "<include> is a macro"),
+        ('"0 0 3"', '"0 0 ${z}"', "'\\${z}' is not a finite number; expand .* with 'xacro'"),
         ("robot", "scene", "1: the outermost element is <scene>, not <robot>"),
         (' name="arm"', "", '1: <robot> lacks name="..."'),
         (

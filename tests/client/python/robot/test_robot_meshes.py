@@ -181,6 +181,7 @@ def test_packages_are_searched_in_order(
     monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
     assert resolve_file(name, urdf, {}) == above
     assert resolve_file("../meshes/a.stl", urdf, {}).samefile(above)
+    assert resolve_file("..\\meshes\\a.stl", urdf, {}).samefile(above)
     assert resolve_file(f"file://{above}", urdf, {}) == above
     assert resolve_file(f"file://localhost{above}", urdf, {}) == above
     assert resolve_file(f"file:{above}", urdf, {}) == above
