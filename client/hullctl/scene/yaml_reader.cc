@@ -1,5 +1,6 @@
 #include "client/hullctl/scene/yaml_reader.h"
 
+#include <absl/strings/ascii.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
 #include <yaml-cpp/depthguard.h>
@@ -116,6 +117,9 @@ absl::StatusOr<YamlReader::Entries> YamlReader::EntriesOf(const YAML::Node& node
       return ErrorAt(entry.first, absl::StrCat("a key of ", what, " is not a string"));
     }
     const std::string& key = entry.first.Scalar();
+    if (key == "<<") {
+      return ErrorAt(entry.first, "merge keys (<<) are not supported; write out the merged keys");
+    }
     if (!seen.insert(key).second) {
       return ErrorAt(entry.first, absl::StrCat(what, " has the key ", Quoted(key), " twice"));
     }
@@ -153,8 +157,8 @@ absl::StatusOr<double> YamlReader::Number(const YAML::Node& node, const std::str
 }
 
 absl::StatusOr<bool> YamlReader::Truth(const YAML::Node& node, const std::string& key) const {
-  if (node.IsScalar() && node.Scalar() == "true") return true;
-  if (node.IsScalar() && node.Scalar() == "false") return false;
+  const std::string text = node.IsScalar() ? absl::AsciiStrToLower(node.Scalar()) : "";
+  if (text == "true" || text == "false") return text == "true";
   return ErrorAt(node, absl::StrCat(key, " must be true or false"));
 }
 

@@ -30,7 +30,7 @@ place:
   left: {body: corner, at: [10, 0, 0]}
   right: {body: corner, at: {xyz: [20, 0, 0], rpy: [0, 0, 3]}}
 ignore: [[left, building], [right, floor]]
-ask: {separation: true, clearance: 0.01, tolerance: 0}
+ask: {separation: True, clearance: 0.01, tolerance: 0}
 )";
 
 SceneDescription Parse(const std::string& text) {
@@ -209,6 +209,8 @@ TEST(YamlScene, ErrorsNameLineColumnAndKey) {
       {"place: {a: {id: x}}\nignore: [[a, b]]", "cell.yaml:2:14: ignore: \"b\" is not a placement"},
       {"place: {a: {id: x}}\nignore: [[a]]", "cell.yaml:2:10: ignore must be pairs of names"},
       {"place: {a: {id: x}}\nask: {pairs: [[a, a]], movers: [a]}", "cannot be combined"},
+      {"place: {a: &a {id: x}, b: {<<: *a}}",
+       "cell.yaml:1:29: merge keys (<<) are not supported; write out the merged keys"},
       {"ask: {separation: yes}", "cell.yaml:1:19: separation must be true or false"},
       {"ask: {clearance: -1}", "clearance must be at least 0"},
       {"place: {a: {id: x, radius: -1}}", "cell.yaml:1:28: radius must be at least 0"},
