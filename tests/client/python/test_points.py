@@ -66,6 +66,32 @@ def test_values_that_are_not_numbers_are_refused() -> None:
             hulld.as_points(bad)
 
 
+class _Table:
+    """A table as pandas and polars provide it."""
+
+    def __init__(self, columns: list[str]) -> None:
+        self.columns = columns
+
+    def __array__(self, dtype: Any = None) -> Any:
+        return np.array([range(len(self.columns))], dtype)
+
+
+# The columns z, y, and x were taken for x, y, and z.
+def test_columns_in_another_order_are_refused_with_advice() -> None:
+    assert hulld.as_points(_Table(["x", "y", "z"])).tolist() == [[0, 1, 2]]
+    assert hulld.as_points(_Table(["0", "1", "2"])).tolist() == [[0, 1, 2]]
+    for columns in (["z", "y", "x"], ["x", "y", "z", "red"]):
+        names = ", ".join(columns)
+        with pytest.raises(ValueError, match=rf"columns {names}; pass points\[\['x', 'y', 'z'\]\]"):
+            hulld.as_points(_Table(columns))
+
+
+def test_structured_arrays_are_refused_with_advice() -> None:
+    structured = np.zeros(4, [("x", "f4"), ("y", "f4"), ("z", "f4"), ("i", "u1")])
+    with pytest.raises(TypeError, match="fields x, y, z, i; pass .*structured_to_unstructured"):
+        hulld.as_points(structured)
+
+
 def test_the_name_of_a_file_is_refused_with_advice() -> None:
     with pytest.raises(TypeError, match="points is 'part.stl'; read the file first"):
         hulld.as_points("part.stl")

@@ -44,9 +44,10 @@ def as_points(points: PointsLike, name: str = "points") -> Points:
     x 3. float64 and float32 are kept without a copy; float16 and integers are widened. Copies only
     if necessary.
 
-    ValueError: a different shape; a coordinate that is masked or not finite (the message names it);
-    numbers that are not exactly doubles, such as some integers beyond 2^53 or long doubles.
-    TypeError: not numbers, such as booleans, complex numbers, or the name of a file.
+    ValueError: a different shape; a table with the columns x, y, and z in another order, or with
+    further ones; a coordinate that is masked or not finite (the message names it); numbers that are
+    not exactly doubles, such as some integers beyond 2^53 or long doubles.
+    TypeError: not numbers, such as booleans, complex numbers, structures, or the name of a file.
     """
     if isinstance(points, (str, os.PathLike)):
         raise TypeError(
@@ -55,7 +56,17 @@ def as_points(points: PointsLike, name: str = "points") -> Points:
         )
     if not isinstance(points, np.ndarray):
         points = getattr(points, "vertices", getattr(points, "points", points))
+    columns = [str(column) for column in getattr(points, "columns", ())]
+    if columns != ["x", "y", "z"] and {"x", "y", "z"} <= {*columns}:
+        raise ValueError(
+            f"{name} has the columns {', '.join(columns)}; pass {name}[['x', 'y', 'z']]"
+        )
     array = as_array(points, name)
+    if array.dtype.names:
+        raise TypeError(
+            f"{name} has the fields {', '.join(array.dtype.names)}; pass np.lib.recfunctions."
+            f"structured_to_unstructured({name}[['x', 'y', 'z']])"
+        )
     if array.size == 0 and array.ndim < 2:
         array = array.reshape(0, 3)
     if array.ndim == 1 and array.shape[0] == 3:
