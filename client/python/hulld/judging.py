@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from hulld import arguments
 from hulld.answers.collisions import AnswerRow, Batch, Problem, Relation
+from hulld.answers.equality import ArrayFields
 from hulld.client import Client
 from hulld.geometry.placements import Placements
 from hulld.geometry.points import PointsLike
@@ -67,8 +68,8 @@ class WrongAnswer:
         )
 
 
-@dataclass(frozen=True, repr=False)
-class Judged:
+@dataclass(frozen=True, repr=False, eq=False)
+class Judged(ArrayFields):
     """The result of judge. wrong: worst first. counts: wrong answers by fault; an answer may have
     several. failed: by row, the reason for a missing exact answer. distance_errors, depth_errors:
     n, the absolute errors; NaN where the table has no value. time_errors: n, the distances of

@@ -52,6 +52,27 @@ def test_both_clients_have_one_surface() -> None:
             assert inspect.getdoc(getattr(sync, name)) and inspect.getdoc(getattr(other, name))
 
 
+# == raised a ValueError about the truth value of an array.
+def test_answers_with_arrays_can_be_compared(client: hulld.Client, name: str) -> None:
+    put(client, name)
+    pair = [name, (name, (5, 0, 0))]
+    options: dict[str, Any] = {"separation": True, "witness": True, "certificate": True}
+    for ask in (
+        lambda: client.get_hull(name, properties=True),
+        lambda: client.get_hull_mesh(name),
+        lambda: client.check_collision(*pair, axis=True, normal=True, **options),
+        lambda: client.check_collisions(pair, [(0, 1)], **options),
+        lambda: client.find_collisions(pair, **options),
+        lambda: client.contains(CUBE, name),
+        lambda: client.cast([(-9, 0.5, 0.5)], [(18, 0, 0)], pair),
+    ):
+        assert ask() == ask() and ask() != 1
+    assert client.get_hull_mesh(name) != client.get_hull_mesh(
+        name, side="inside", max_vertices=4
+    )
+    assert client.contains(CUBE, name) != client.contains(CUBE + 1, name)
+
+
 def test_status_contains_version_and_limits(either: Any) -> None:
     status = either.get_status()
     assert status.version and status.store_kind == "memory"

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from hulld.answers.equality import ArrayFields
 from hulld.answers.hulls import Header, enum_or_zero
 from hulld.errors import HulldError, error_class
 from hulld.geometry.placements import Placements
@@ -100,8 +101,8 @@ class Separation:
     bound: float
 
 
-@dataclass(frozen=True)
-class Witness:
+@dataclass(frozen=True, eq=False)
+class Witness(ArrayFields):
     """Two points, x y z in the world frame, that attain the separation, each with an error of at
     most `error`."""
 
@@ -110,8 +111,8 @@ class Witness:
     error: float
 
 
-@dataclass(frozen=True)
-class Normal:
+@dataclass(frozen=True, eq=False)
+class Normal(ArrayFields):
     """The direction in which the separation is attained, from A toward B; if there are several, one
     of them.
 
@@ -126,8 +127,8 @@ class Normal:
     angle_bound: float
 
 
-@dataclass(frozen=True)
-class Feature:
+@dataclass(frozen=True, eq=False)
+class Feature(ArrayFields):
     """The points of a hull that lie farthest along an axis.
 
     vertex_indices: into the canonical snapshot. vertices: the same vertices, n x 3, in the hull's
@@ -139,8 +140,8 @@ class Feature:
     facet_index: int | None
 
 
-@dataclass(frozen=True)
-class Axis:
+@dataclass(frozen=True, eq=False)
+class Axis(ArrayFields):
     """A direction that proves that the hulls are separated or touching, not necessarily the
     direction in which they are nearest (see Normal). direction: x y z in the world frame, from A
     toward B, of unit length up to rounding."""
@@ -151,8 +152,8 @@ class Axis:
     feature_b: Feature
 
 
-@dataclass(frozen=True)
-class VertexPair:
+@dataclass(frozen=True, eq=False)
+class VertexPair(ArrayFields):
     """A vertex of A and a vertex of B: indices into the canonical snapshots, and x y z, each in the
     frame of its own hull."""
 
@@ -392,8 +393,8 @@ class AnswerRow(_Answer):
         return _short(self, "" if self.pair is None else f"pair={self.pair}", ("pair",))
 
 
-@dataclass(frozen=True)
-class Answers:
+@dataclass(frozen=True, eq=False)
+class Answers(ArrayFields):
     """The answers about m pairs, one row each. answers[i] is row i, as an AnswerRow.
 
     relations, rungs: m values of Relation and Rung, as uint8; compare them, as in relations ==
@@ -509,8 +510,8 @@ def _counted(answers: Answers) -> str:
     return f"{len(answers)} pairs" + (f": {', '.join(names)}" if names else "")
 
 
-@dataclass(frozen=True, repr=False)
-class _Rows:
+@dataclass(frozen=True, repr=False, eq=False)
+class _Rows(ArrayFields):
     """Pairs with their answers, row by row."""
 
     pairs: npt.NDArray[np.uint32]
@@ -555,7 +556,7 @@ class _Rows:
         return error_class(problem.code)(message, code=problem.code, reason=problem.reason)
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class Batch(_Rows):
     """The answers to all pairs of a batch.
 
@@ -580,7 +581,7 @@ class SceneTotals:
     failed: int
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class Scene(_Rows):
     """All pairs of a scene that collide, or are within the clearance or tolerance: k x 2 pairs, the
     lower index first, ascending. Other fields are as in Batch."""
@@ -588,7 +589,7 @@ class Scene(_Rows):
     totals: SceneTotals
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)
 class StreamAnswer(_Rows):
     """The answer to one message of a collision stream.
 

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hulld.answers.collisions import Answers, Batch, Relation
+from hulld.answers.equality import ArrayFields
 from hulld.answers.status import Limits
 from hulld.geometry.placements import Placement, Placements
 from hulld.geometry.points import Points
@@ -19,8 +20,8 @@ _POINTS_PER_CALL = 1 << 16
 _ORIGIN = np.zeros((1, 3))
 
 
-@dataclass(frozen=True, repr=False)
-class Containment:
+@dataclass(frozen=True, repr=False, eq=False)
+class Containment(ArrayFields):
     """The positions of n points, as in `points[found.inside]`.
 
     relations: of each point to the hull, as Relation in uint8. separations, separation_bounds: if

@@ -9,10 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from hulld.answers.collisions import Answers, Relation, Scene, SeparatedInterval
+from hulld.answers.equality import ArrayFields
 
 
-@dataclass(frozen=True)
-class Hits:
+@dataclass(frozen=True, eq=False)
+class Hits(ArrayFields):
     """The placements that rays meet: k rows, ascending by ray, then by time.
 
     rays, placements: k indices. times: k, from 0 at the origin of the ray to 1 at its end; a time

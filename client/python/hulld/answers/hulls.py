@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from hulld.answers.equality import ArrayFields
 from hulld.notebook import Viewer
 from hulld.v1 import hull_pb2
 from hulld.wire import named_arrays, named_fields
@@ -116,8 +117,8 @@ class BoundedValue:
     bound: float
 
 
-@dataclass(frozen=True)
-class HullProperties:
+@dataclass(frozen=True, eq=False)
+class HullProperties(ArrayFields):
     """Properties of a hull in its own frame, for density 1, in powers of the caller's length unit.
 
     Volume, centroid, and inertia are the doubles nearest to the exact values, and exact if their
@@ -134,8 +135,8 @@ class HullProperties:
     inertia_bounds: npt.NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class Hull:
+@dataclass(frozen=True, eq=False)
+class Hull(ArrayFields):
     """Sizes, point counts, and bounding box of a hull.
 
     edge_count, facet_count: None if not requested. box: 2 x 3, the lowest and the highest corner,
@@ -182,8 +183,8 @@ class Hull:
         return viewer.html(rows, [self.info.hull_id])
 
 
-@dataclass(frozen=True)
-class HullMesh:
+@dataclass(frozen=True, eq=False)
+class HullMesh(ArrayFields):
     """The canonical snapshot of a hull, or a simplification of it, all at the same revision.
 
     vertices: n x 3, the caller's length unit, in canonical order, with the doubles that were
@@ -258,8 +259,8 @@ class HullEventKind(IntEnum):
     DELETED = 5
 
 
-@dataclass(frozen=True)
-class HullEvent:
+@dataclass(frozen=True, eq=False)
+class HullEvent(ArrayFields):
     """hull: as of its revision; DELETED: only hull_id, and the revision of the deletion. box: as in
     Hull. is_body: True for a body; `hull` then has only its ID, revisions, and the damaged flag,
     and piece_count is its number of pieces."""
