@@ -11,23 +11,31 @@
 
 namespace hulld {
 
+namespace {
+
+// Returns the cell without surrounding white space and double quotes.
+std::string_view Unquoted(std::string_view cell) {
+  cell = Trim(cell);
+  const bool is_quoted = cell.size() >= 2 && cell.front() == '"' && cell.back() == '"';
+  return is_quoted ? cell.substr(1, cell.size() - 2) : cell;
+}
+
+}  // namespace
+
 std::vector<std::string_view> CellsOf(std::string_view line) {
   std::vector<std::string_view> cells;
   line = Trim(line);
   if (line.empty() || line.front() == '#') return cells;
   const size_t separator = line.find_first_of(",;\t");
   if (separator == std::string_view::npos) {
-    for (std::string_view cell; !(cell = NextToken(&line)).empty();) cells.push_back(cell);
+    for (std::string_view cell; !(cell = NextToken(&line)).empty();)
+      cells.push_back(Unquoted(cell));
     return cells;
   }
   const char mark = line[separator];
   for (;;) {
     const size_t end = line.find(mark);
-    std::string_view cell = Trim(line.substr(0, end));
-    if (cell.size() >= 2 && cell.front() == '"' && cell.back() == '"') {
-      cell = cell.substr(1, cell.size() - 2);
-    }
-    cells.push_back(cell);
+    cells.push_back(Unquoted(line.substr(0, end)));
     if (end == std::string_view::npos) return cells;
     line.remove_prefix(end + 1);
   }

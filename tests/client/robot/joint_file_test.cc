@@ -36,9 +36,10 @@ class JointFile : public testing::Test {
 };
 
 TEST_F(JointFile, ColumnsAreAssignedToTheirJoints) {
-  for (const char* text : {"# a path\ntime,slide,shoulder\n0,0.6,1\n\n# half way\n1,0.7,-1\n",
-                           "time;\"slide\";shoulder\n0;0.6;1\n1;0.7;-1\n",
-                           "time slide shoulder\n0 0.6 1\n1  0.7 -1\n"}) {
+  for (const char* text :
+       {"# a path\ntime,slide,shoulder\n0,0.6,1\n\n# half way\n1,0.7,-1\n",
+        "time;\"slide\";shoulder\n0;0.6;1\n1;0.7;-1\n", "time slide shoulder\n0 0.6 1\n1  0.7 -1\n",
+        "\"time\" \"slide\" \"shoulder\"\n0 0.6 1\n1 0.7 -1\n"}) {
     EXPECT_EQ(Read(text), "") << text;
     EXPECT_THAT(waypoints_, ElementsAre(ElementsAre(1, 0, 0.6), ElementsAre(-1, 0, 0.7))) << text;
   }
