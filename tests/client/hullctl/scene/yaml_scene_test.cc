@@ -210,7 +210,7 @@ TEST(YamlScene, ErrorsNameLineColumnAndKey) {
       {"place: {a: {id: x}}\nignore: [[a]]", "cell.yaml:2:10: ignore must be pairs of names"},
       {"place: {a: {id: x}}\nask: {pairs: [[a, a]], movers: [a]}", "cannot be combined"},
       {"place: {a: &a {id: x}, b: {<<: *a}}",
-       "cell.yaml:1:29: merge keys (<<) are not supported; write out the merged keys"},
+       "cell.yaml:1:28: merge keys (<<) are not supported; write out the merged keys"},
       {"ask: {separation: yes}", "cell.yaml:1:19: separation must be true or false"},
       {"ask: {clearance: -1}", "clearance must be at least 0"},
       {"place: {a: {id: x, radius: -1}}", "cell.yaml:1:28: radius must be at least 0"},
