@@ -368,6 +368,8 @@ GltfDocument::Elements<kSize> GltfDocument::ElementsOf(size_t index, bool* is_fl
   }
   const bool has_view = Find(accessor, "bufferView") != nullptr;
   const bool has_sparse = Find(accessor, "sparse") != nullptr;
+  // Some exporters write empty primitives.
+  if (ok() && count == 0 && Find(accessor, "count") != nullptr) return elements;
   if (count == 0 || (!has_view && (!has_sparse || count > file_bytes_))) {
     Fail(absl::StrCat(what, " has no ", kSize == 3 ? "positions" : "elements",
                       ": neither a count nor a bufferView"));

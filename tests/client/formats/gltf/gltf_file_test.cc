@@ -193,6 +193,21 @@ TEST(GltfFile, AStrideOfZeroMeansPackedElements) {
               HasSubstr("reaches beyond its buffer"));
 }
 
+TEST(GltfFile, PrimitivesMayBeEmpty) {
+  const std::string two = Replaced(Gltf(Bytes(kTriangle), kFloats), R"("primitives":[)",
+                                   R"("primitives":[{"attributes":{"POSITION":1}},)");
+  const auto with_accessor = [&two](const std::string& accessor) {
+    return ReadText(
+        Replaced(two, R"("count":3})",
+                 absl::StrCat(R"("count":3},{"type":"VEC3","componentType":5126)", accessor, "}")),
+        PointFormat::kGltf);
+  };
+  EXPECT_EQ(with_accessor(R"(,"count":0)").counts.points, 3u);
+  EXPECT_THAT(with_accessor("").error(), HasSubstr("accessors[1] has no positions"));
+  EXPECT_THAT(Error(Gltf(Bytes(kTriangle), R"("componentType":5126,"count":0)")),
+              HasSubstr("the meshes of the scene have no vertex"));
+}
+
 TEST(GltfFile, NamesNeedNotBeUtf8) {
   const PointsRead read =
       ReadText(Gltf(Bytes(kTriangle), kFloats, ",\"name\":\"\xa3\""), PointFormat::kGltf);
@@ -310,7 +325,7 @@ TEST(GltfFile, BoundsAreChecked) {
   EXPECT_THAT(error(R"("count":3)", R"("count":4)"), HasSubstr("accessors[0] reaches beyond"));
   EXPECT_THAT(error(R"("count":3)", R"("count":9e15)"), HasSubstr("accessors[0] reaches beyond"));
   EXPECT_THAT(error(R"("count":3)", R"("count":-1)"), HasSubstr("count is not a whole number"));
-  EXPECT_THAT(error(R"("count":3)", R"("count":0)"), HasSubstr("has no positions"));
+  EXPECT_THAT(error(R"("count":3)", R"("count":0)"), HasSubstr("have no vertex"));
   EXPECT_THAT(error(R"("POSITION":0)", R"("POSITION":1)"),
               HasSubstr("accessors[1] is out of range"));
   EXPECT_THAT(error(R"("POSITION":0)", R"("NORMAL":0)"), HasSubstr("have no vertex"));
