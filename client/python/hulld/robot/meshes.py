@@ -24,6 +24,10 @@ _MAX_CONVEX_VERTICES = 4096
 _RELATIVE_TOLERANCE = 1e-3
 _TRIANGLES_AT_ONCE = 256
 _BYTES_TO_CLASSIFY = 1024
+#: A comment, but not the end of 1.#INF.
+_COMMENT = re.compile(r"(?<!\.)#.*")
+#: The statements of OBJ that a backslash continues.
+_CONTINUED = re.compile(r"[vf][\s\\]")
 _FORTRAN_EXPONENT = re.compile(r"(?<=[0-9.])[dD]")
 _LINE_END = re.compile("\r\n|\r|\n")
 _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -152,7 +156,8 @@ def _number(word: str, factor: Fraction, place: str) -> float:
 
 def _lines(path: os.PathLike[str], data: bytes) -> Iterator[tuple[str, str]]:
     """Each line with its location, as in FILE:7."""
-    text = data.decode("utf-8-sig", "replace")
+    # Removes the end-of-text mark of DOS.
+    text = data.decode("utf-8-sig", "replace").removesuffix("\x1a")
     lines = _LINE_END.split(text)
     for number, line in enumerate(lines if lines[-1] else lines[:-1], 1):
         yield f"{os.fspath(path)}:{number}", line
@@ -169,14 +174,19 @@ def _read_obj(path: pathlib.Path, data: bytes, scale: Scale) -> Mesh:
     name = group = continued = place = ""
     largest = (0, "")
     for place, line in _lines(path, data):
-        content = line.strip()
-        # Comments often contain Windows paths.
-        if content.endswith("\\") and (continued or not content.startswith("#")):
-            continued += content[:-1] + " "
+        statement = (continued + line).strip()
+        without_comment = _COMMENT.sub("", statement)
+        # Names and comments often contain Windows paths, which may end in a backslash; the next
+        # line is then a statement of its own.
+        is_continued = statement.endswith("\\") and statement == without_comment
+        if is_continued and _CONTINUED.match(statement):
+            continued = statement[:-1] + " "
             continue
-        words, continued = (continued + content).split(), ""
+        words, continued = statement.split(), ""
         if not words:
             continue
+        if words[0] in ("v", "f"):
+            words = without_comment.split()
         if words[0] == "v":
             if len(words) < 4:
                 raise ValueError(f"{place}: a vertex has {len(words) - 1} of 3 coordinates")
@@ -215,8 +225,6 @@ def _corners(words: list[str], before: int, place: str) -> list[int]:
     from the last vertex before the face."""
     corners = []
     for word in words:
-        if word.startswith("#"):
-            break
         text = word.partition("/")[0]
         digits = text.removeprefix("-")
         corner = int(text) if digits.isascii() and digits.isdigit() else 0
@@ -235,7 +243,10 @@ def _corners(words: list[str], before: int, place: str) -> list[int]:
 def _read_stl(path: pathlib.Path, data: bytes, scale: Scale) -> Mesh:
     """Text starts with `solid` and has no control characters in its first KiB; keywords may have
     any letter case, and normals may be missing."""
-    if any(byte < 0x20 and byte not in b"\t\n\v\f\r" for byte in data[:_BYTES_TO_CLASSIFY]):
+    start = data[:_BYTES_TO_CLASSIFY]
+    if len(data) < _BYTES_TO_CLASSIFY:
+        start = start.removesuffix(b"\x1a")
+    if any(byte < 0x20 and byte not in b"\t\n\v\f\r" for byte in start):
         corners = _read_binary_stl(path, data).astype(np.float64)
         columns = [_scaled(corners[:, i], scale[i]) for i in range(3)]
         vertices, parts = np.stack(columns, axis=1), np.zeros(len(corners) // 3, np.intp)

@@ -60,8 +60,16 @@ def test_stl_is_read_in_both_forms(tmp_path: pathlib.Path) -> None:
         f"solid a\n{FACET.replace('normal 0 0 1', 'normal nan nan nan')}endsolid a",
         f"solid a\n{FACET.replace(' normal 0 0 1', '')}endsolid a",
         f"\ufeffsolid a\n\t{FACET.replace(' ', chr(9))}endsolid a",
+        f"solid a\n{FACET}endsolid a\n\x1a",
     ):
         assert points_of(tmp_path / "a.stl", text).tolist() == expected[:3]
+
+
+# The next vertex was lost.
+def test_a_backslash_ends_names_and_comments(tmp_path: pathlib.Path) -> None:
+    text = "mtllib c:\\a\\\nv 0 0 0 # c:\\b\\\nv 1 \\\n0 0#c\ng d:\\c\\\nv 0 2 0\nf 1 2 3#c\n"
+    points = points_of(tmp_path / "a.obj", text)
+    assert points.tolist() == [[0, 0, 0], [1, 0, 0], [0, 2, 0]]
 
 
 @pytest.mark.parametrize(
