@@ -75,7 +75,9 @@ def read_xml(path: str | os.PathLike[str], root: str) -> Element:
     read.
     """
     source = os.fspath(path)
-    parser = expat.ParserCreate()
+    with open(path, "rb") as file:
+        data = file.read()
+    parser = expat.ParserCreate(_encoding_of(data))
     document = Element(source, "", {}, 0)
     open_elements = [document]
 
@@ -100,13 +102,22 @@ def read_xml(path: str | os.PathLike[str], root: str) -> Element:
     parser.StartElementHandler = start
     parser.EndElementHandler = lambda _: open_elements.pop()
     parser.StartDoctypeDeclHandler = refuse
-    with open(path, "rb") as file:
-        try:
-            parser.Parse(file.read(), True)
-        except expat.ExpatError as error:
-            reason = expat.ErrorString(error.code)
-            raise ValueError(f"{source}:{error.lineno}: not valid XML: {reason}") from None
+    try:
+        parser.Parse(data, True)
+    except expat.ExpatError as error:
+        reason = expat.ErrorString(error.code)
+        raise ValueError(f"{source}:{error.lineno}: not valid XML: {reason}") from None
     element = document.children[0]
     if element.tag != root:
         raise element.error(f"the outermost element is <{element.tag}>, not <{root}>")
     return element
+
+
+def _encoding_of(data: bytes) -> str | None:
+    """ISO 8859-1, the most common encoding of files that are not UTF-8; None if expat finds the
+    encoding itself."""
+    try:
+        data.decode()
+    except UnicodeDecodeError:
+        return None if data[:2] in (b"\xff\xfe", b"\xfe\xff") else "ISO-8859-1"
+    return None

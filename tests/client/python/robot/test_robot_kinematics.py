@@ -152,6 +152,13 @@ def test_configurations_are_checked(write: Write) -> None:
 # --- Descriptions ---
 
 
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "latin-1", "utf-16"])
+def test_names_are_read_in_any_encoding(tmp_path: pathlib.Path, encoding: str) -> None:
+    path = tmp_path / "a.urdf"
+    path.write_bytes('<robot name="r"><link name="Körper"/></robot>'.encode(encoding))
+    assert read_urdf(path).links[0].name == "Körper"
+
+
 # Atlas has spheres of radius 0, and the Kinova arms have a box of size 0.
 @pytest.mark.parametrize("shape", ['<box size="0 0 0"/>', '<sphere radius="0"/>'])
 def test_sizes_may_be_zero(write: Write, shape: str) -> None:
