@@ -16,7 +16,7 @@ import sys
 MODULES = ("appender", "client", "client_base", "collision_stream", "watches")
 CLASSES = ("Appender", "Client", "ClientBase", "CollisionStream", "CollisionWatch", "HullWatch")
 #: Coroutines, and asynchronous generators, of transport.py: functions, and methods of Duplex.
-AWAITED = {"close_channel", "invoke", "read", "sleep"}
+AWAITED = {"close_channel", "invoke", "pause", "read", "sleep"}
 AWAITED_METHODS = {"close_sending", "expect", "receive", "send"}
 ITERATED = {"each"}
 #: Objects with methods that may be coroutines.

@@ -13,7 +13,7 @@ from hulld.answers.hulls import Header, HullChanges
 from hulld.calls.attempts import Search
 from hulld.calls.reported_pairs import ReportedPairs, WatchedPlacements
 from hulld.calls.requests import Call, update_stream
-from hulld.calls.transport import Duplex, Lock, cancel_call, read, sleep
+from hulld.calls.transport import Duplex, Event, Lock, cancel_call, pause, read
 from hulld.calls.watch_position import WatchPosition
 from hulld.errors import HulldError, InternalError, UnavailableError, read_answer
 from hulld.geometry.placements import check_update
@@ -50,7 +50,7 @@ class HullWatch:
         self._retry = retry
         self._reconnect_timeout = reconnect_timeout
         self._call: Any = None
-        self._cancelled = False
+        self._cancelled = Event()
 
     @property
     def position(self) -> Header | None:
@@ -62,13 +62,13 @@ class HullWatch:
 
     def __next__(self) -> HullChanges:
         search = Search(self._retry, self._reconnect_timeout, self._position.connected)
-        while not self._cancelled:
+        while not self._cancelled.is_set():
             request = self._request(self._position.after)
             first = self._call is None
             if first:
                 self._call = self._start(request)
                 # By another thread, which did not see the call.
-                if self._cancelled:
+                if self._cancelled.is_set():
                     break
             try:
                 message = read(self._call)
@@ -79,14 +79,14 @@ class HullWatch:
                 failed = error
             cancel_call(self._call)
             self._call = None
-            if not self._cancelled:
-                sleep(search.wait_after(failed))
+            if not self._cancelled.is_set():
+                pause(self._cancelled, search.wait_after(failed))
         self.cancel()
         raise StopIteration
 
     def cancel(self) -> None:
         """Ends the iteration permanently."""
-        self._cancelled = True
+        self._cancelled.set()
         call = self._call
         if call is not None:
             cancel_call(call)
@@ -133,17 +133,18 @@ class CollisionWatch:
         self._lock = Lock()
         self._connection: Duplex | None = None
         self._updates_before = 0
-        self._first = self._connected = self._cancelled = False
+        self._first = self._connected = False
+        self._cancelled = Event()
 
     def __iter__(self) -> Iterator[CollisionChanges]:
         return self
 
     def __next__(self) -> CollisionChanges:
         search = Search(self._retry, self._reconnect_timeout, self._connected)
-        while not self._cancelled:
+        while not self._cancelled.is_set():
             connection = self._open()
             # By another thread, which did not see the connection.
-            if self._cancelled:
+            if self._cancelled.is_set():
                 break
             try:
                 message = connection.receive(None)
@@ -157,8 +158,8 @@ class CollisionWatch:
             connection.cancel()
             with self._lock:
                 self._connection = None
-            if not self._cancelled:
-                sleep(search.wait_after(failed))
+            if not self._cancelled.is_set():
+                pause(self._cancelled, search.wait_after(failed))
         self.cancel()
         raise StopIteration
 
@@ -192,7 +193,7 @@ class CollisionWatch:
 
     def cancel(self) -> None:
         """Ends the iteration permanently."""
-        self._cancelled = True
+        self._cancelled.set()
         connection = self._connection
         if connection is not None:
             connection.cancel()

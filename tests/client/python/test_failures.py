@@ -16,6 +16,7 @@ import pytest
 import hulld
 from fake_hulld import FakeHulld, refuse
 from hulld.aio import transport
+from hulld.calls import transport as sync_transport
 from hulld.calls.reported_pairs import WatchedPlacements
 from hulld.calls.requests import SceneFilter, watch_hulls
 from hulld.errors import from_status
@@ -323,7 +324,7 @@ def test_a_watch_resumes_after_a_long_quiet_time(monkeypatch: pytest.MonkeyPatch
     clock = [0.0]
     passing = types.SimpleNamespace(monotonic=lambda: clock[0])
     monkeypatch.setattr("hulld.calls.attempts.time", passing)
-    monkeypatch.setattr("hulld.watches.sleep", lambda seconds: None)
+    monkeypatch.setattr("hulld.watches.pause", lambda event, seconds: None)
     revisions = iter((10, 20, 30))
 
     class Quiet:
@@ -349,6 +350,46 @@ def test_a_watch_resumes_after_a_long_quiet_time(monkeypatch: pytest.MonkeyPatch
 
     watch = hulld.HullWatch(Quiet, begin, None, QUICK, 20)
     assert [next(watch).header.revision for _ in range(3)] == [10, 20, 30]
+
+
+class Lost:
+    """A stream of answers that is lost before the first one."""
+
+    def __init__(self, call: Any) -> None:
+        pass
+
+    def __next__(self) -> bytes:
+        raise LostAfterAnHour
+
+    async def read(self) -> bytes:
+        raise LostAfterAnHour
+
+    def cancel(self) -> None:
+        pass
+
+
+@pytest.mark.parametrize("is_async", [False, True])
+def test_cancelling_a_watch_ends_its_wait_for_a_retry(
+    monkeypatch: pytest.MonkeyPatch, is_async: bool
+) -> None:
+    slow = hulld.RetryPolicy(initial_backoff=3600, max_backoff=3600)
+    kind: Any = hulld.aio.AsyncHullWatch if is_async else hulld.HullWatch
+    watch = kind(Lost, lambda after: watch_hulls("", None, False, after), None, slow, None)
+
+    def pause_and_cancel(event: threading.Event, seconds: float) -> None:
+        threading.Thread(target=watch.cancel).start()
+        sync_transport.pause(event, seconds)
+
+    async def pause_and_cancel_async(event: asyncio.Event, seconds: float) -> None:
+        asyncio.get_running_loop().call_soon(watch.cancel)
+        await transport.pause(event, seconds)
+
+    async def messages() -> list[Any]:
+        return [changes async for changes in watch]
+
+    monkeypatch.setattr("hulld.watches.pause", pause_and_cancel)
+    monkeypatch.setattr("hulld.aio.watches.pause", pause_and_cancel_async)
+    assert (asyncio.run(messages()) if is_async else list(watch)) == []
 
 
 def test_a_watch_that_cannot_read_an_answer_ends_its_call() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from collections.abc import AsyncIterator, Iterator
 from typing import Any, Union, cast
 
@@ -15,6 +16,7 @@ from hulld.geometry.points import PointsLike
 #: as they arrive.
 PointsSource = Union[PointsLike, Iterator[PointsLike], AsyncIterator[PointsLike]]
 
+Event = asyncio.Event
 Lock = asyncio.Lock
 sleep = asyncio.sleep
 _END: Any = object()
@@ -35,6 +37,12 @@ async def close_channel(channel: Channel) -> None:
     closing = channel.close()
     if closing is not None:
         await closing
+
+
+async def pause(event: Event, seconds: float) -> None:
+    """Waits until the event is set, at most this many seconds."""
+    with contextlib.suppress(TimeoutError):
+        await asyncio.wait_for(event.wait(), seconds)
 
 
 def cancel_call(call: Any) -> None:

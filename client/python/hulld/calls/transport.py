@@ -17,6 +17,7 @@ from hulld.geometry.points import PointsLike
 #: Points of a call: an array, or an iterator of arrays that are sent as they arrive.
 PointsSource = Union[PointsLike, Iterator[PointsLike]]
 
+Event = threading.Event
 Lock = threading.Lock
 sleep = time.sleep
 _END: Any = object()
@@ -41,6 +42,11 @@ def open_channel(connection: Connection, pem_files: Any) -> Any:
 def close_channel(channel: Channel) -> None:
     """Closes a channel and every call on it."""
     channel.close()
+
+
+def pause(event: Event, seconds: float) -> None:
+    """Waits until the event is set, at most this many seconds."""
+    event.wait(seconds)
 
 
 def cancel_call(call: Any) -> None:
