@@ -1,3 +1,4 @@
+#include <absl/strings/ascii.h>
 #include <absl/strings/str_cat.h>
 
 #include <charconv>
@@ -56,6 +57,14 @@ class ObjWalk {
           absl::StrCat("the file refers to ", Quoted(Trim(rest)),
                        ", which is not read; insert the content of that file here, and remove \"",
                        std::string(keyword), "\""));
+    }
+    // Names of statements have letters only.
+    const bool is_vertex_or_face = keyword.starts_with('v') || keyword.starts_with('f');
+    if (is_vertex_or_face && keyword.size() > 1 &&
+        !absl::ascii_isalpha(static_cast<unsigned char>(keyword[1]))) {
+      return source_->ErrorAtLine(absl::StrCat(Quoted(keyword), " is not a statement; separate \"",
+                                               std::string(1, keyword[0]),
+                                               "\" from its first number with a space"));
     }
     return absl::OkStatus();
   }

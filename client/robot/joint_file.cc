@@ -28,8 +28,9 @@ std::vector<std::string_view> CellsOf(std::string_view line) {
   if (line.empty() || line.front() == '#') return cells;
   const size_t separator = line.find_first_of(",;\t");
   if (separator == std::string_view::npos) {
-    for (std::string_view cell; !(cell = NextToken(&line)).empty();)
+    for (std::string_view cell; !(cell = NextToken(&line)).empty();) {
       cells.push_back(Unquoted(cell));
+    }
     return cells;
   }
   const char mark = line[separator];

@@ -249,8 +249,9 @@ std::string GltfDocument::FileOf(const std::string& uri, size_t size, const std:
   const std::filesystem::path folder = std::filesystem::path(source_->name()).parent_path();
   std::error_code error;
   // Exporters on Windows may write its separator.
-  if (!std::filesystem::exists(folder / name, error))
+  if (!std::filesystem::exists(folder / name, error)) {
     std::replace(name.begin(), name.end(), '\\', '/');
+  }
   const std::filesystem::path path = folder / name;
   const uintmax_t file_size = std::filesystem::file_size(path, error);
   if (uri.find("://") != std::string::npos || name.find('\0') != std::string::npos || error) {

@@ -39,6 +39,14 @@ TEST(ObjFile, ABackslashEndsNamesAndComments) {
       ElementsAre(1, 2, 3, 4, 5, 6, 7, 8, 9, 0, 0, 0));
 }
 
+// The vertex was lost.
+TEST(ObjFile, AKeywordWithoutASpaceIsAnError) {
+  EXPECT_EQ(ReadText("v 1 2 3\nv4 5 6\n", PointFormat::kObj).error(),
+            "FILE:2: \"v4\" is not a statement; separate \"v\" from its first number with a space");
+  EXPECT_THAT(ReadText("v\xC2\xA0 1 2 3\n", PointFormat::kObj).error(),
+              HasSubstr("is not a statement"));
+}
+
 TEST(ObjFile, ErrorsNameFileAndLine) {
   EXPECT_EQ(ReadText("v 1 2 3\n\nv 1 abc 3\n", PointFormat::kObj).error(),
             "FILE:3: \"abc\" is not a number");

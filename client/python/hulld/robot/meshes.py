@@ -208,6 +208,11 @@ def _read_obj(path: pathlib.Path, data: bytes, scale: Scale) -> Mesh:
                 f"{place}: the file refers to {' '.join(words[1:])!r}, which is not read; insert "
                 f"the content of that file here, and remove {words[0]!r}"
             )
+        elif words[0][0] in "vf" and not words[0].isalpha():
+            raise ValueError(
+                f"{place}: {words[0]!r} is not a statement; separate {words[0][0]!r} from its first "
+                "number with a space"
+            )
     if continued:
         raise ValueError(f"{place}: the file ends after a backslash that continues its line")
     if not vertices:

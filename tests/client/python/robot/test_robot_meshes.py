@@ -124,6 +124,7 @@ def test_obj_is_read(tmp_path: pathlib.Path) -> None:
         ("v 0 0 0\nf a\n", "2: 'a' is not a vertex"),
         ("v 0 0 0\nf\n", "2: a face names no vertex"),
         ("v 0 0 0 \\", "1: the file ends after a backslash"),
+        ("v 0 0 0\nv1 2 3\n", "2: 'v1' is not a statement; separate 'v' from its first number"),
         ("v 0 0 0\ncall part 2.obj\n", "2: the file refers to 'part 2.obj', which is not read"),
         ("v 0 0 \u0661\n", "1: '\u0661' is not a finite number"),
     ):
