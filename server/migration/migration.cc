@@ -137,6 +137,7 @@ absl::StatusOr<MigrationCounts> Migration::CopyTo(MigrationTarget& target) {
   size_t vertices = 0;
   const auto flush = [&] {
     std::vector<const Change*> changes;
+    changes.reserve(pending.size());
     for (const Change& change : pending) changes.push_back(&change);
     absl::Status status = changes.empty() ? absl::OkStatus() : target.Add(changes);
     pending.clear();
