@@ -169,8 +169,8 @@ int RunMigrate(const std::vector<std::string>& arguments, std::ostream& out, std
        {"--to-data-dir", &to.data_dir, "The destination: a directory, created if missing"},
        {"--to-postgres-conninfo-file", &to.conninfo_file, "The destination: an empty database"}},
       "Run the same command again to resume an interrupted run, or to verify a finished copy\n"
-      "that no server has changed. Revisions and writers' sequences are kept; the copy is a new\n"
-      "store with its own ID.\n"
+      "that no server has changed. Revisions and writers' sequences are kept;\n"
+      "the copy is a new store with its own ID.\n"
       "Exit status: 0 everything is copied and verified, 1 it failed and can be resumed, 2 it "
       "was\nrefused, and nothing was changed."};
   if (const std::optional<int> exit = command.Parse(arguments, out, err)) return *exit;
