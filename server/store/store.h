@@ -253,7 +253,7 @@ class Store {
   // Calls are sequential, in commit order. On an error, the whole batch is refused and the store
   // unchanged, even for a process that opens it after this one was killed. Exception: UNAVAILABLE
   // with a message that the outcome is unknown. Until Recover succeeds, the next process may then
-  // find the batch. RESOURCE_EXHAUSTED: the disk is full; deletions may succeed after Recover.
+  // find the batch. RESOURCE_EXHAUSTED: the disk is full; a batch of deletions alone may succeed.
   virtual absl::Status Commit(std::span<Change* const> changes) = 0;
   // Makes Commit possible again after an error, or returns the cause. Not concurrent with Commit.
   virtual absl::Status Recover() = 0;

@@ -142,15 +142,9 @@ absl::Status Committer::Write(std::vector<Pending>& batch) {
   changes.reserve(batch.size());
   for (Pending& pending : batch) changes.push_back(&pending.change);
   absl::Status status;
-  const bool was_failing = Statistics().failing;
-  if (was_failing) status = store_.Recover();
+  if (Statistics().failing) status = store_.Recover();
   const auto start = std::chrono::steady_clock::now();
   if (status.ok()) status = store_.Commit(changes);
-  // A full disk may have been found by other work, such as a backup.
-  if (absl::IsResourceExhausted(status) && !was_failing) {
-    status = store_.Recover();
-    if (status.ok()) status = store_.Commit(changes);
-  }
   if (metrics_ != nullptr) {
     const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
     metrics_->commit_seconds.Observe(taken.count());

@@ -300,18 +300,6 @@ TEST_F(CommitterTest, TheStoreRecoversBeforeTheNextBatch) {
   EXPECT_FALSE(committer_.Statistics().failing);
 }
 
-TEST_F(CommitterTest, ABatchIsCommittedAgainAfterItFindsAFullDisk) {
-  GatedStore::Gate gate;
-  store_.Close(gate);
-  gate.outcome.set_value(absl::ResourceExhaustedError("no space"));
-  Submit(1).wait();
-  EXPECT_EQ(store_.recoveries(), 1);
-  EXPECT_THAT(store_.batches(), ElementsAre(ElementsAre(1)));
-  EXPECT_EQ(committer_.Statistics().failed_batches, 0);
-  const std::lock_guard lock(order_);
-  EXPECT_THAT(outcomes_, ElementsAre(Outcome(1, absl::StatusCode::kOk)));
-}
-
 TEST_F(CommitterTest, CommitsQueuedChangesBeforeItEnds) {
   GatedStore store;
   FairMutex order;
