@@ -60,8 +60,8 @@ struct HullMesh {
   size_t vertex_count() const { return xyz.size() / 3; }
 };
 
-// A connection to hulld. Connects on first use. Thread-safe. gRPC does not survive a fork: if a
-// process has used a client, its forked children must not use any, unless they call exec first.
+// A connection to hulld. Connects on first use. Thread-safe. gRPC does not survive a fork: after a
+// process has used a client, its forked children must not use one unless they call exec.
 //
 // Errors carry the server's code and message. UNAVAILABLE and DEADLINE_EXCEEDED mean that no answer
 // arrived. Calls that are safe to repeat are retried by options.retry until their deadline, after
@@ -139,8 +139,8 @@ class Client {
   absl::StatusOr<v1::DeleteBodyResponse> DeleteBody(const std::string& body_id,
                                                     std::optional<uint64_t> if_revision = {}) const;
 
-  // Watches creations, changes, and deletions of hulls. The timeout bounds the time to connect, and
-  // to reconnect to a lost server.
+  // Watches creations, changes, and deletions of hulls. No attempt to connect, or to reconnect to a
+  // lost server, starts after the timeout; an attempt takes at most 5 s.
   std::unique_ptr<HullWatch> WatchHulls(const v1::WatchHullsRequest& request) const;
 
   absl::StatusOr<v1::CheckCollisionResponse> CheckCollision(
@@ -161,8 +161,7 @@ class Client {
   absl::Status FindCollisions(const v1::FindCollisionsRequest& request,
                               const SceneReceiver& receive) const;
 
-  // Watches pairs for collisions that begin and end. The timeout bounds the time to connect, and to
-  // reconnect to a lost server.
+  // Watches pairs for collisions that begin and end. The timeout is as for WatchHulls.
   std::unique_ptr<CollisionWatch> WatchCollisions(v1::CollisionWatchOpen open) const;
 
   absl::StatusOr<v1::GetStatusResponse> GetStatus() const;

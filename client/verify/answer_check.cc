@@ -86,6 +86,7 @@ bool IsDecidingPairProven(const CheckedBodies& answer) {
 std::vector<MovingVertices> Moving(const std::vector<PlacedVertices>& pieces,
                                    const v1::Placement& placement) {
   std::vector<MovingVertices> moving;
+  moving.reserve(pieces.size());
   for (const PlacedVertices& piece : pieces) moving.push_back(Moving(piece, placement));
   return moving;
 }

@@ -183,12 +183,13 @@ absl::Status CheckRelation(v1::Relation relation) {
   return ProofFails(absl::StrCat(v1::Relation_Name(relation), " has no certificate"));
 }
 
-absl::StatusOr<std::vector<BigVector>> DifferencesOf(const v1::Certificate& given, int max_pairs,
-                                                     const ExactHull& a, const ExactHull& b) {
-  const v1::Certificate certificate = Located(given, a, b);
-  HULLD_RETURN_IF_ERROR(CheckPairs(certificate, max_pairs, a, b));
+absl::StatusOr<std::vector<BigVector>> DifferencesOf(const v1::Certificate& certificate,
+                                                     int max_pairs, const ExactHull& a,
+                                                     const ExactHull& b) {
+  const v1::Certificate located = Located(certificate, a, b);
+  HULLD_RETURN_IF_ERROR(CheckPairs(located, max_pairs, a, b));
   std::vector<BigVector> differences;
-  for (const v1::VertexPair& pair : certificate.pairs()) {
+  for (const v1::VertexPair& pair : located.pairs()) {
     differences.push_back(b.scale * a.World(pair.index_a()) - a.scale * b.World(pair.index_b()));
   }
   return differences;

@@ -115,8 +115,9 @@ BigVertices ToIntegers(std::span<const double> xyz, const CommonExponent& length
 }
 
 // p_W = R(q) p / |q|^2 + t, and for a piece R(q_B) (R(q_P) p / |q_P|^2 + t_P) / |q_B|^2 + t_B.
-ExactHull::ExactHull(const PlacedVertices& hull, BigVertices given, const CommonExponent& lengths)
-    : xyz(hull.xyz), in_any_order(hull.in_any_order), vertices(std::move(given)) {
+ExactHull::ExactHull(const PlacedVertices& hull, BigVertices exact_vertices,
+                     const CommonExponent& lengths)
+    : xyz(hull.xyz), in_any_order(hull.in_any_order), vertices(std::move(exact_vertices)) {
   HULLD_CLIENT_CHECK(vertices != nullptr && vertices->size() == xyz.size() / 3);
   radius = lengths.ToInteger(hull.radii[0]) + lengths.ToInteger(hull.radii[1]);
   const BigRotation outer = ExactRotation(hull.pose);
@@ -134,12 +135,12 @@ ExactHull::ExactHull(const PlacedVertices& hull, BigVertices given, const Common
   shift = inner.scale * Product(outer.rows, t_P) + scale * t;
 }
 
-ExactHull::ExactHull(const PlacedVertices& hull, BigVertices given, const CommonExponent& lengths,
-                     const BigRotation& rotation, const BigVector& translation,
-                     const BigInteger& divisor)
+ExactHull::ExactHull(const PlacedVertices& hull, BigVertices exact_vertices,
+                     const CommonExponent& lengths, const BigRotation& rotation,
+                     const BigVector& translation, const BigInteger& divisor)
     : xyz(hull.xyz),
       in_any_order(hull.in_any_order),
-      vertices(std::move(given)),
+      vertices(std::move(exact_vertices)),
       radius(lengths.ToInteger(hull.radii[0]) + lengths.ToInteger(hull.radii[1])) {
   HULLD_CLIENT_CHECK(vertices != nullptr && vertices->size() == xyz.size() / 3);
   for (int i = 0; i < 3; ++i) rows[i] = divisor * rotation.rows[i];

@@ -67,11 +67,11 @@ struct ExactHull {
   // Requires CheckPlacement, an exponent that covers the hull (IncludeLengths), and its vertices at
   // that exponent. (The number of vertices is checked. Their values are not, because that would
   // repeat the conversion.)
-  ExactHull(const PlacedVertices& hull, BigVertices vertices, const CommonExponent& lengths);
+  ExactHull(const PlacedVertices& hull, BigVertices exact_vertices, const CommonExponent& lengths);
 
   // p_W = rotation(p) + translation / divisor. Requires divisor > 0. The vertices of a piece are
   // those in its body's frame.
-  ExactHull(const PlacedVertices& hull, BigVertices vertices, const CommonExponent& lengths,
+  ExactHull(const PlacedVertices& hull, BigVertices exact_vertices, const CommonExponent& lengths,
             const BigRotation& rotation, const BigVector& translation, const BigInteger& divisor);
 
   // Returns scale p_W of vertex i.

@@ -41,8 +41,8 @@ const std::string& ReportedPairs::HullOf(uint32_t placement) const {
       return packed.hull_ids(static_cast<int>(hull));
     }
   }
-  static const std::string none;
-  return none;
+  static const std::string kNone;
+  return kNone;
 }
 
 void ReportedPairs::TakeHulls(const v1::WatchCollisionsResponse& message) {

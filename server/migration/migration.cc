@@ -79,9 +79,9 @@ absl::Status Migration::CheckSource() const {
   const StoreTotals totals = source_->totals();
   if (source_->supports_lookup() &&
       (hulls_.size() != totals.hulls || bodies_.size() != totals.bodies)) {
-    return absl::DataLossError(absl::StrCat("the source contains ", hulls_.size(), " hulls and ",
-                                            bodies_.size(), " bodies, not ", totals.hulls, " and ",
-                                            totals.bodies, " as it states; restore a backup"));
+    return absl::DataLossError(absl::StrCat("the source has recorded ", totals.hulls, " hulls and ",
+                                            totals.bodies, " bodies, but contains ", hulls_.size(),
+                                            " and ", bodies_.size(), "; restore a backup"));
   }
   uint64_t revision = 0;
   for (const StoredHull& hull : hulls_) revision = std::max(revision, hull.record.revision);

@@ -399,7 +399,7 @@ TEST(MigrationOfADatabase, LostRowsAreFound) {
   expect_refused("UPDATE hulld.store SET revision = 1", "a change of revision " + revision);
   expect_refused("UPDATE hulld.store SET revision = " + revision +
                      "; DELETE FROM hulld.hulls WHERE hull_id = 'h'",
-                 "the source contains 1 hulls and 0 bodies, not 2 and 0");
+                 "the source has recorded 2 hulls and 0 bodies, but contains 1 and 0");
 }
 
 TEST_P(MigrationTest, TheCommandLineIsChecked) {

@@ -123,6 +123,7 @@ TEST_F(PostgresShared, ManyWritersOfOneHullLoseNothingAndCountNothingTwice) {
   constexpr uint64_t kChunks = 25;
   const std::vector<Vector> points = SpherePoints(kWriters * kChunks);
   std::vector<std::thread> writers;
+  writers.reserve(kWriters);
   for (int w = 0; w < kWriters; ++w) {
     writers.emplace_back([&, w] {
       const std::string name = absl::StrCat("w", w);
