@@ -141,10 +141,17 @@ absl::Status Committer::Write(std::vector<Pending>& batch) {
   std::vector<Change*> changes;
   changes.reserve(batch.size());
   for (Pending& pending : batch) changes.push_back(&pending.change);
+  const bool was_failing = Statistics().failing;
   absl::Status status;
-  if (Statistics().failing) status = store_.Recover();
+  if (was_failing) status = store_.Recover();
   const auto start = std::chrono::steady_clock::now();
   if (status.ok()) status = store_.Commit(changes);
+  // A backup may have filled the disk, unnoticed by this class. Deletions succeed on a full disk.
+  if (absl::IsResourceExhausted(status) && !was_failing &&
+      std::ranges::all_of(changes, &Change::deleted)) {
+    status = store_.Recover();
+    if (status.ok()) status = store_.Commit(changes);
+  }
   if (metrics_ != nullptr) {
     const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
     metrics_->commit_seconds.Observe(taken.count());

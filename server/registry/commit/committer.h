@@ -30,7 +30,7 @@ struct CommitStatistics {
 //
 // A change may build on earlier changes that are not committed yet. A refused batch therefore
 // refuses everything submitted so far, and the submitters undo it. The store recovers before the
-// next batch.
+// next batch; at once if a batch of deletions finds a full disk.
 //
 // Two locks are used. `order` belongs to the submitters. They hold it while they submit, so the
 // queue has the order of their records. The completions of a refused batch run without releasing

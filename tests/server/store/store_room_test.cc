@@ -73,6 +73,15 @@ TEST_F(StoreRoom, AFullDiskAcceptsOnlyDeletions) {
   EXPECT_EQ(hulls_->registry().Sizes().hull_count, kHulls);
 }
 
+TEST_F(StoreRoom, TheFirstDeletionAfterAFailedBackupSucceeds) {
+  Start();
+  for (int i = 0; i < kHulls; ++i) ASSERT_TRUE(PutNext().ok());
+  files_->SetRoom(files_->used());
+  ASSERT_FALSE(hulls_->store().MakeCopy().ok());
+  const auto deleted = hulls_->Delete("h0");
+  EXPECT_TRUE(deleted.ok()) << deleted.status();
+}
+
 TEST_F(StoreRoom, DeletionsMakeRoomForChanges) {
   FillDisk();
   for (int i = 1; i < kHulls; ++i) ASSERT_TRUE(hulls_->Delete(absl::StrCat("h", i)).ok()) << i;
