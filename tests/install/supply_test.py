@@ -30,13 +30,13 @@ def linked_packages(program):
     """Returns the packages that own the libraries, by a different method than sbom.sh."""
     libraries = {pathlib.Path(path).resolve()
                  for path in re.findall(r'(/\S+)', output('ldd', program))}
-    owners = subprocess.run(['dpkg', '-S', *(f'*/{library.name}' for library in libraries)],
-                            capture_output=True, text=True)
+    names = {library.name for library in libraries}
     found = {}
-    for line in owners.stdout.splitlines():
-        names, path = line.rsplit(': ', 1)
-        if (real := pathlib.Path(path).resolve()) in libraries:
-            found[real] = names.split(':')[0]
+    for contents in pathlib.Path('/var/lib/dpkg/info').glob('*.list'):
+        for path in contents.read_text().splitlines():
+            if (path.rpartition('/')[2] in names
+                    and (real := pathlib.Path(path).resolve()) in libraries):
+                found[real] = contents.stem.split(':')[0]
     assert set(found) == libraries, libraries - set(found)
     return set(found.values())
 
