@@ -180,8 +180,12 @@ int Main(const std::vector<std::string>& arguments) {
 }  // namespace hulld::server
 
 int main(int argc, char** argv) {
+  hulld::server::FillStandardStreams();
   // Debian builds Abseil without NDEBUG, so its mutexes, which gRPC locks for every call, look for
   // deadlocks by default.
   absl::SetMutexDeadlockDetectionMode(absl::OnDeadlockCycle::kIgnore);
-  return hulld::server::Main(std::vector<std::string>(argv + 1, argv + argc));
+  const int code = hulld::server::Main(std::vector<std::string>(argv + 1, argv + argc));
+  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return code;
+  std::fputs("hulld: cannot write to standard output: the disk is full, or it is closed\n", stderr);
+  return code == 0 ? hulld::server::kExitFailure : code;
 }

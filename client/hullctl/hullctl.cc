@@ -1,8 +1,10 @@
 #include "client/hullctl/hullctl.h"
 
 #include <absl/strings/str_cat.h>
+#include <poll.h>
 #include <unistd.h>
 
+#include <csignal>
 #include <iostream>
 #include <memory>
 #include <optional>
@@ -148,6 +150,25 @@ absl::StatusOr<std::unique_ptr<LocalServer>> StartLocal(Invocation* invocation) 
   return server;
 }
 
+// Returns true if standard output is a pipe without a reader, such as an ended `head`.
+bool IsPipeClosed() {
+  pollfd output = {STDOUT_FILENO, 0, 0};
+  return poll(&output, 1, 0) == 1 && (output.revents & POLLERR) != 0;
+}
+
+// Returns the exit code, or kUsage if the output could not be written. If its reader has ended, so
+// does the program, silently, as other programs do.
+ExitCode Flush(const Invocation& invocation, ExitCode code) {
+  invocation.out.flush();
+  if (invocation.out) return code;
+  if (&invocation.out == &std::cout && IsPipeClosed()) {
+    std::signal(SIGPIPE, SIG_DFL);
+    std::raise(SIGPIPE);
+  }
+  invocation.err << "hullctl: cannot write the answer: the disk is full, or the output is closed\n";
+  return ExitCode::kUsage;
+}
+
 ExitCode RunAction(Invocation* invocation) {
   std::unique_ptr<LocalServer> local;
   if (invocation->needs_server && invocation->local) {
@@ -158,11 +179,7 @@ ExitCode RunAction(Invocation* invocation) {
   }
   // Machine-readable output has no colors.
   if (invocation->json() || invocation->names()) invocation->paint = Painter();
-  const ExitCode code = invocation->action();
-  invocation->out.flush();
-  if (invocation->out) return code;
-  invocation->err << "hullctl: cannot write the answer: the disk is full, or the pipe is closed\n";
-  return ExitCode::kUsage;
+  return invocation->action();
 }
 
 }  // namespace
@@ -178,9 +195,8 @@ int RunHullctl(const std::vector<std::string>& arguments, std::ostream& out, std
     return CompleteWords({arguments.begin() + 1, arguments.end()}, &command_line, &invocation);
   }
   const std::optional<ExitCode> ended = command_line.Parse(WithoutHelpCommand(arguments), out, err);
-  if (ended.has_value()) return static_cast<int>(*ended);
   invocation.program = &command_line.description();
-  return static_cast<int>(RunAction(&invocation));
+  return static_cast<int>(Flush(invocation, ended.has_value() ? *ended : RunAction(&invocation)));
 }
 
 }  // namespace hulld

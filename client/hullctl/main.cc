@@ -1,4 +1,6 @@
 #include <absl/synchronization/mutex.h>
+#include <fcntl.h>
+#include <unistd.h>
 
 #include <csignal>
 #include <cstdlib>
@@ -6,11 +8,26 @@
 
 #include "client/hullctl/hullctl.h"
 
+namespace {
+
+// Opens /dev/null in place of each closed standard stream. Otherwise, a file or socket would get
+// its number, and output would be written to it. Writing to such a stream still fails.
+void FillStandardStreams() {
+  int opened = 0;
+  do {
+    opened = open("/dev/null", O_RDONLY);
+  } while (opened >= 0 && opened <= STDERR_FILENO);
+  if (opened > STDERR_FILENO) close(opened);
+}
+
+}  // namespace
+
 int main(int argc, char** argv) {
+  FillStandardStreams();
   // Debian builds Abseil without NDEBUG, so by default its mutexes, which gRPC locks for every
   // call, check for deadlocks.
   absl::SetMutexDeadlockDetectionMode(absl::OnDeadlockCycle::kIgnore);
-  // A closed pipe becomes a failed write, which is reported.
+  // A closed connection or pipe becomes a failed write.
   std::signal(SIGPIPE, SIG_IGN);
   std::ios::sync_with_stdio(false);
   // gRPC's log would repeat our errors; the user can enable it.

@@ -34,6 +34,10 @@ uint64_t MaxDescriptors();
 // Raises that limit to the hard limit.
 void RaiseDescriptorLimit();
 
+// Opens /dev/null in place of each closed standard stream. Otherwise, a file or socket would get
+// its number, and the log would be written to it. Writing to such a stream still fails.
+void FillStandardStreams();
+
 }  // namespace hulld::server
 
 #endif  // HULLD_SERVER_PROCESS_DESCRIPTORS_H_

@@ -40,6 +40,7 @@ ExitCode Generate(const Invocation& run, const GenerateArguments& arguments) {
   uint64_t done = 0;
   const ExitCode written = run.WriteFile(arguments.file, [&](std::ostream& out) {
     GenerateCloud(cloud, [&](const std::array<double, 3>& p) {
+      if (!out) return;
       if (++done % 4096 == 0) bar.Update(done);
       out << ShortestText(p[0]) << ' ' << ShortestText(p[1]) << ' ' << ShortestText(p[2]) << '\n';
     });

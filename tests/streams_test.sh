@@ -1,0 +1,34 @@
+#!/bin/bash
+# hulld and hullctl with standard streams that are closed or cannot be written: streams_test.sh PROGRAMS
+set -euo pipefail
+export PATH=$1:$PATH
+work=$(mktemp -d)
+cd "$work"
+export HOME=$work
+hulld --data-dir store --listen unix:socket </dev/null >&- 2>&- &
+server=$!
+trap 'kill $server 2>/dev/null && wait $server || true; rm -rf "$work"' EXIT
+until hullctl health --server unix:socket >/dev/null 2>&1; do
+  kill -0 $server
+  sleep 0.1
+done
+for stream in 1 2; do
+  file=$(readlink /proc/$server/fd/$stream)
+  [[ $file == /dev/null ]] || { echo "$file is stream $stream of hulld"; exit 1; }
+done
+hullctl create box --server unix:socket >/dev/null
+kill $server
+wait $server
+
+# Each command must fail, and say so on the other stream.
+for command in "hulld --help" "hulld --version" "hulld --check-config" "hulld doctor --data-dir store" \
+  "hullctl --help" "hullctl --version" "hullctl generate lattice 8"; do
+  ! $command >/dev/full 2>errors || { echo "$command succeeded on a full disk"; exit 1; }
+  grep -q "cannot write" errors || { echo "$command: $(cat errors)"; exit 1; }
+  ! $command >&- 2>errors || { echo "$command succeeded without a standard output"; exit 1; }
+  grep -q "cannot write" errors || { echo "$command: $(cat errors)"; exit 1; }
+done
+
+# The end of the reader ends a program silently.
+hullctl generate sphere 10000 2>errors | head -n 1 >/dev/null || [[ ${PIPESTATUS[0]} == 141 ]]
+[[ ! -s errors ]] || { echo "a closed pipe: $(cat errors)"; exit 1; }
