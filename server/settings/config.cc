@@ -10,6 +10,7 @@
 #include <cctype>
 #include <charconv>
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <limits>
@@ -170,6 +171,11 @@ class Parser {
   // INVALID_ARGUMENT, naming the file and the line: not TOML, an unknown key, or a value that is
   // not a string, number, or boolean.
   absl::StatusOr<std::vector<Setting>> FromFile(const std::string& path) const {
+    std::error_code ignored;
+    // Could be opened, but would be read as an empty file.
+    if (std::filesystem::is_directory(path, ignored)) {
+      return absl::InvalidArgumentError(absl::StrCat("--config: ", path, ": it is a directory"));
+    }
     const toml::parse_result table = toml::parse_file(path);
     if (!table) {
       const uint32_t line = table.error().source().begin.line;
@@ -224,10 +230,17 @@ class Parser {
   }
 
   // Returns OK, with `print` set for --help and --version. INVALID_ARGUMENT: the parser's error.
-  absl::Status Parse(std::vector<std::string> arguments, CommandLine* result) {
-    std::reverse(arguments.begin(), arguments.end());  // CLI11 consumes arguments from the back.
+  absl::Status Parse(const std::vector<std::string>& arguments, CommandLine* result) {
+    // CLI11 would take the argument after "--name=" as its value, and expects the reverse order.
+    std::vector<std::string> reversed;
+    for (const std::string& word : arguments) {
+      const bool is_empty = word.starts_with("--") && word.find('=') + 1 == word.size();
+      reversed.push_back(word.substr(0, word.size() - (is_empty ? 1 : 0)));
+      if (is_empty) reversed.emplace_back();
+    }
+    std::reverse(reversed.begin(), reversed.end());
     try {
-      app_.parse(std::move(arguments));
+      app_.parse(std::move(reversed));
     } catch (const CLI::CallForVersion& version) {
       result->print = std::string(version.what()) + "\n";
       return absl::OkStatus();
@@ -304,7 +317,8 @@ class Parser {
             "Allow --listen without TLS on addresses that other machines can reach. Anyone on "
             "the path can then read and change all traffic, including tokens");
     Add("threads", config_.threads, "Threads that compute answers; 0: one per usable processor")
-        ->check(CLI::Range(0, 1024));
+        ->check(WholeNumber(0, 1024))
+        ->type_name("N");
     AddStore();
     AddSeconds("drain-timeout", config_.drain_timeout,
                "Time for running calls to finish after SIGTERM or SIGINT");
@@ -431,14 +445,18 @@ class Parser {
   }
 
   // CLI::Range alone would take -1 for the largest number.
+  static CLI::Validator WholeNumber(uint64_t min, uint64_t max) {
+    const auto check = [=](const std::string& text) -> std::string {
+      uint64_t number = 0;
+      if (absl::SimpleAtoi(text, &number) && number >= min && number <= max) return "";
+      return absl::StrCat("\"", text, "\" is not a whole number from ", min, " to ", max);
+    };
+    return CLI::Validator(check, "");
+  }
+
   void AddLimit(const std::string& name, uint64_t& value, const std::string& description,
                 uint64_t max = kAnyNumber) {
-    const auto check = [max](const std::string& text) -> std::string {
-      uint64_t number = 0;
-      if (absl::SimpleAtoi(text, &number) && number >= 1 && number <= max) return "";
-      return absl::StrCat("\"", text, "\" is not a whole number from 1 to ", max);
-    };
-    Add(name, value, description)->check(CLI::Validator(check, ""))->type_name("N");
+    Add(name, value, description)->check(WholeNumber(1, max))->type_name("N");
   }
 
   // Adds a size in bytes. A default of 0 is also accepted as a value.

@@ -287,6 +287,21 @@ TEST_F(ConfigTest, PrintedSettingsReadBackAsTheSameSettings) {
   EXPECT_FALSE(again->check);
 }
 
+TEST_F(ConfigTest, ADirectoryIsNotAFileOfSettings) {
+  ExpectRefused({"--config", ::testing::TempDir()}, "it is a directory");
+}
+
+TEST_F(ConfigTest, AnEmptyValueDoesNotTakeTheNextFlag) {
+  ExpectRefused({"--max-hulls=", "--insecure"}, "\"\" is not a whole number");
+  const Config config = Accepted({"--data-dir=", "--insecure"});
+  EXPECT_NE(config.data_dir, "--insecure");
+  EXPECT_TRUE(config.insecure);
+}
+
+TEST_F(ConfigTest, ThreadsAreAWholeNumber) {
+  ExpectRefused({"--threads", "2.5"}, "\"2.5\" is not a whole number from 0 to 1024");
+}
+
 TEST_F(ConfigTest, HelpNamesEveryFlagAndVersionIsPrinted) {
   const absl::StatusOr<CommandLine> help = Parse({"--help"});
   ASSERT_TRUE(help.ok());
