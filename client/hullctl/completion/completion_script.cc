@@ -9,15 +9,16 @@ constexpr char kBash[] =
     R"sh(# bash completion for hullctl. Read it with: source <(hullctl completion bash)
 _hullctl() {
   local line=${COMP_LINE:0:COMP_POINT} words=() reply=() program candidate directive last cut=
-  read -ra words <<<"$line"
-  [[ $line == *[[:space:]] ]] && words+=("")
+  # Without -r, so that the words have no backslashes.
+  read -a words <<<"$line"
+  [[ $line == *[^\\][[:space:]] ]] && words+=("")
   # Assignments in front, as in "HULLCTL_CONTEXT=cell-3 hullctl list".
   while [[ ${words[0]} == *=* ]]; do words=("${words[@]:1}"); done
   # An alias is not known by its name.
   program=${words[0]/#\~/$HOME}
   type -P "$program" >/dev/null || program=hullctl
-  last=${words[${#words[@]} - 1]}
-  mapfile -t reply < <("$program" __complete "${words[@]:1}" 2>/dev/null)
+  last=${words[${#words[@]} - 1]#[\'\"]}
+  mapfile -t reply < <("$program" __complete "${words[@]:1:${#words[@]}-2}" "$last" 2>/dev/null)
   ((${#reply[@]} > 0)) || return 0
   directive=${reply[${#reply[@]} - 1]}
   unset "reply[${#reply[@]}-1]"

@@ -62,6 +62,10 @@ case $kind in
     cases
     # Bash replaces only the part after the "=" or ":".
     expect "hullctl list --output=w" "wide" "$(offers 'hullctl list --output=w')"
+    touch "my points.xyz"
+    expect "a backslash" "my points.xyz" "$(offers 'hullctl append box my\ p')"
+    expect "a blank after a backslash" "my points.xyz" "$(offers 'hullctl append box my\ ')"
+    expect "a quote" "arm/left" "$(offers 'hullctl get "a')"
     expect "an alias" "arm/left" "$(offers 'h get a')"
     expect "an assignment in front" "arm/left" "$(offers 'HULLCTL_CONTEXT=here hullctl get a')"
     expect "a program that is typed with its path" "check" "$(offers "$programs/hullctl che")"
