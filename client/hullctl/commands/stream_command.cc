@@ -122,7 +122,7 @@ ExitCode Stream(const Invocation& run, const StreamArguments& arguments) {
   StreamRun stream(run, scene, std::move(pairs));
   absl::Status status = stream.Open(scene.only_changes || arguments.only_changes);
   std::string text;
-  while (status.ok() && NextLine(source.get(), &text)) {
+  while (status.ok() && run.out && NextLine(source.get(), &text)) {
     v1::CollisionStreamUpdate update;
     const absl::Status parsed = ParseJson(text, UnknownFields::kRefuse, &update);
     if (!parsed.ok()) {

@@ -60,8 +60,8 @@ void PrintHullEvents(const v1::WatchHullsResponse& message, const Invocation& ru
   if (message.synced()) run.out << "# synced at revision " << message.header().revision() << "\n";
 }
 
-// Prints messages until the watch ends, the callback returns true, or Ctrl-C. Returns the error
-// that ended the watch.
+// Prints messages until the watch ends, the callback returns true, the output fails, or Ctrl-C.
+// Returns the error that ended the watch.
 template <typename Watch, typename Print>
 absl::Status PrintAll(const Invocation& run, const std::unique_ptr<Watch> watch,
                       const Print& print) {
@@ -77,7 +77,7 @@ absl::Status PrintAll(const Invocation& run, const std::unique_ptr<Watch> watch,
     if (run.json()) run.out << MessageJson(*message) << "\n";
     const bool is_enough = print(*message);
     run.out << std::flush;
-    if (is_enough) return absl::OkStatus();
+    if (is_enough || !run.out) return absl::OkStatus();
   }
 }
 

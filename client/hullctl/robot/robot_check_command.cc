@@ -84,7 +84,7 @@ class RobotCheck {
   void WarnOfLimits(uint64_t waypoint, const Waypoint& free_values);
   absl::Status CheckContinuousOptions();
   absl::StatusOr<std::vector<Waypoint>> ReadWaypoints(size_t limit);
-  bool IsFinished() const { return stopped_ || (arguments_.first && HasContact()); }
+  bool IsFinished() const { return stopped_ || !run_.out || (arguments_.first && HasContact()); }
   bool HasContact() const { return first_.has_value() || first_event_.has_value(); }
   absl::Status CheckWaypoints(CheckScope scope);
   absl::Status CheckMotions(CheckScope scope);

@@ -108,6 +108,19 @@ class SharedText : public std::stringbuf {
   std::recursive_mutex mutex_;
 };
 
+// Like a full disk.
+class FullDisk : public std::streambuf {};
+
+TEST_F(HullctlWatch, EndsIfItsOutputFails) {
+  Create("hull");
+  FullDisk disk;
+  std::ostream out(&disk);
+  std::ostringstream err;
+  UseNoContexts();
+  EXPECT_EQ(RunHullctl({"watch", "--server", server_->address()}, out, err), 2);
+  EXPECT_THAT(err.str(), HasSubstr("cannot write the answer"));
+}
+
 TEST_F(HullctlWatch, EndsAtCtrlC) {
   Create("hull");
   SharedText written;
