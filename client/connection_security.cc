@@ -72,6 +72,10 @@ absl::Status ValidateSecurity(const ConnectionSecurity& security, const std::str
   if (security.certificate.empty() != security.key.empty()) {
     return absl::InvalidArgumentError("a client certificate requires its key; set both or neither");
   }
+  // OpenSSL would ask for the passphrase on the terminal.
+  if (security.key.find("ENCRYPTED") != std::string::npos) {
+    return absl::InvalidArgumentError("the private key is encrypted; use one without a passphrase");
+  }
   if (security.tls && security.server_name.empty() && TargetName(server) != server) {
     return absl::InvalidArgumentError(absl::StrCat(
         "a list of addresses requires one certificate name; set it with --server-name"));

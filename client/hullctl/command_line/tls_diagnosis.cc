@@ -121,7 +121,8 @@ std::string ExplainRefusal(SSL* ssl, const ConnectionSecurity& security) {
   if (SSL_read(ssl, &byte, 1) > 0 || ERR_GET_LIB(ERR_peek_error()) != ERR_LIB_SSL) return "";
   return security.certificate.empty() ? "it requires a client certificate; pass --cert and --key"
                                       : "it rejects the client certificate (--cert), which may "
-                                        "have expired or be signed by another authority";
+                                        "have expired, be signed by another authority, or belong "
+                                        "to another --key";
 }
 
 }  // namespace

@@ -28,6 +28,10 @@ ConnectionSettings WithAbsolutePaths(const ConnectionSettings& flags) {
     if (setting.kind != SettingKind::kFile || found == settings.end()) continue;
     found->second = std::filesystem::absolute(found->second).lexically_normal().string();
   }
+  std::string& server = settings.at("server");
+  if (server.starts_with("unix:") && server[5] != '/') {
+    server = "unix:" + std::filesystem::absolute(server.substr(5)).lexically_normal().string();
+  }
   return settings;
 }
 
@@ -53,7 +57,7 @@ ExitCode Add(const Invocation& run, const ContextArguments& arguments) {
   }
   if (!run.flags.contains("server"))
     return run.FailUsage("a context needs a server; pass --server HOST:PORT");
-  HULLD_ASSIGN_OR_FAIL(run.FailUsage, auto file, ReadContextFile());
+  HULLD_ASSIGN_OR_FAIL(run.FailUsage, auto file, LockContextFile());
   if (file.contexts.contains(arguments.name) && !arguments.replace) {
     return run.FailUsage(
         absl::StrCat("context ", arguments.name, " already exists; pass --replace to replace it"));
@@ -79,7 +83,7 @@ ExitCode Use(const Invocation& run, const ContextArguments& arguments) {
   if (arguments.none == !arguments.name.empty()) {
     return run.FailUsage("pass the name of a context, or --none");
   }
-  HULLD_ASSIGN_OR_FAIL(run.FailUsage, auto file, ReadContextFile());
+  HULLD_ASSIGN_OR_FAIL(run.FailUsage, auto file, LockContextFile());
   if (!arguments.none) {
     const auto found = FindContext(file, arguments.name);
     if (!found.ok()) return run.FailUsage(found.status());
@@ -117,7 +121,7 @@ ExitCode ListContexts(const Invocation& run) {
 }
 
 ExitCode Remove(const Invocation& run, const ContextArguments& arguments) {
-  HULLD_ASSIGN_OR_FAIL(run.FailUsage, auto file, ReadContextFile());
+  HULLD_ASSIGN_OR_FAIL(run.FailUsage, auto file, LockContextFile());
   if (const auto found = FindContext(file, arguments.name); !found.ok()) {
     return run.FailUsage(found.status());
   }

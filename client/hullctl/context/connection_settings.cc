@@ -1,12 +1,12 @@
 #include "client/hullctl/context/connection_settings.h"
 
+#include <absl/strings/ascii.h>
 #include <absl/strings/str_cat.h>
 
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
-#include <iterator>
 #include <utility>
 
 #include "client/client.h"
@@ -17,8 +17,12 @@ namespace {
 
 absl::StatusOr<std::string> ReadPem(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
-  if (!file) return absl::InvalidArgumentError(absl::StrCat(path, ": ", std::strerror(errno)));
-  std::string text{std::istreambuf_iterator<char>(file), {}};
+  std::string text;
+  std::getline(file, text, '\0');
+  // A directory can be opened, but not read.
+  if (!file.is_open() || file.bad()) {
+    return absl::InvalidArgumentError(absl::StrCat(path, ": ", std::strerror(errno)));
+  }
   if (text.find("-----BEGIN ") == std::string::npos) {
     return absl::InvalidArgumentError(path + ": not in PEM format");
   }
@@ -66,11 +70,12 @@ absl::StatusOr<ConnectionSettings> SettingsOfEnvironment() {
     if (value == nullptr || *value == '\0') continue;
     std::string text = value;
     if (setting.kind == SettingKind::kFlag) {
+      absl::AsciiStrToLower(&text);
       if (text == "1" || text == "yes" || text == "on") text = "true";
       if (text == "0" || text == "no" || text == "off") text = "false";
       if (text != "true" && text != "false") {
         return absl::InvalidArgumentError(
-            absl::StrCat("$", setting.variable, ": ", Quoted(text), " is not true or false"));
+            absl::StrCat("$", setting.variable, ": ", Quoted(value), " is not true or false"));
       }
     }
     settings[setting.name] = text;

@@ -1,7 +1,9 @@
 #include "client/hullctl/context/context_file.h"
 
 #include <absl/strings/str_cat.h>
+#include <fcntl.h>
 #include <google/protobuf/struct.pb.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -12,6 +14,7 @@
 #include <fstream>
 #include <vector>
 
+#include "client/base/status_macros.h"
 #include "client/formats/text_number.h"
 #include "client/hullctl/help/suggestion.h"
 #include "client/hullctl/printing/json.h"
@@ -94,6 +97,19 @@ bool WriteAll(int descriptor, const std::string& text) {
   return fsync(descriptor) == 0;
 }
 
+absl::Status CannotWrite(const std::string& place, int error) {
+  return absl::InvalidArgumentError(
+      absl::StrCat(place, " cannot be written: ", std::strerror(error)));
+}
+
+absl::Status CreateFolder(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder.parent_path(), error);
+  if (error) return CannotWrite(folder.string(), error.value());
+  if (mkdir(folder.c_str(), 0700) == 0 || errno == EEXIST) return absl::OkStatus();
+  return CannotWrite(folder.string(), errno);
+}
+
 }  // namespace
 
 std::string ContextFilePath() {
@@ -146,34 +162,41 @@ absl::StatusOr<ContextFile> ReadContextFile() {
   return file;
 }
 
+absl::StatusOr<ContextFile> LockContextFile() {
+  const std::filesystem::path folder = std::filesystem::path(ContextFilePath()).parent_path();
+  // If the folder cannot be created or locked, WriteContextFile reports why, or succeeds.
+  CreateFolder(folder).IgnoreError();
+  const int descriptor = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  const std::shared_ptr<const void> lock(nullptr, [=](const void*) { close(descriptor); });
+  while (flock(descriptor, LOCK_EX) != 0 && errno == EINTR) {
+  }
+  HULLD_ASSIGN_OR_RETURN(ContextFile file, ReadContextFile());
+  file.lock = lock;
+  return file;
+}
+
 absl::Status WriteContextFile(const ContextFile& file) {
-  const std::string path = ContextFilePath();
+  std::string path = ContextFilePath();
   if (path.empty()) {
     return absl::InvalidArgumentError(
         "cannot determine the folder of contexts; set HOME or XDG_CONFIG_HOME");
   }
-  const auto problem = [](const std::string& place, int error) {
-    return absl::InvalidArgumentError(
-        absl::StrCat(place, " cannot be written: ", std::strerror(error)));
-  };
-  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
-  std::error_code error;
-  std::filesystem::create_directories(folder.parent_path(), error);
-  if (!error && mkdir(folder.c_str(), 0700) != 0 && errno != EEXIST) {
-    return problem(folder.string(), errno);
+  HULLD_RETURN_IF_ERROR(CreateFolder(std::filesystem::path(path).parent_path()));
+  std::error_code ignored;
+  if (std::filesystem::is_symlink(path, ignored) && std::filesystem::exists(path, ignored)) {
+    path = std::filesystem::canonical(path, ignored).string();
   }
-  if (error) return problem(folder.string(), error.value());
   std::string draft = path + ".XXXXXX";
   // mkstemp creates files that only their owner may read.
   const int descriptor = mkstemp(draft.data());
-  if (descriptor < 0) return problem(draft, errno);
+  if (descriptor < 0) return CannotWrite(path, errno);
   const bool written = WriteAll(descriptor, ToJson(file));
   int failed = written ? 0 : errno;
   close(descriptor);
   if (written && rename(draft.c_str(), path.c_str()) != 0) failed = errno;
   if (failed == 0) return absl::OkStatus();
   unlink(draft.c_str());
-  return problem(path, failed);
+  return CannotWrite(path, failed);
 }
 
 std::string ContextNameProblem(const std::string& name) {

@@ -5,6 +5,7 @@
 #include <absl/status/statusor.h>
 
 #include <map>
+#include <memory>
 #include <string>
 
 #include "client/hullctl/context/connection_settings.h"
@@ -16,6 +17,8 @@ struct ContextFile {
   // Empty: none.
   std::string current;
   std::map<std::string, ConnectionSettings> contexts;
+  // Set by LockContextFile.
+  std::shared_ptr<const void> lock = nullptr;
 };
 
 // Returns $XDG_CONFIG_HOME/hullctl/contexts.json, or ~/.config/hullctl/contexts.json; empty if
@@ -26,8 +29,12 @@ std::string ContextFilePath();
 // file, the defect, and the remedy.
 absl::StatusOr<ContextFile> ReadContextFile();
 
-// Replaces the file atomically; only its owner may read it. Creates missing folders.
-// INVALID_ARGUMENT: it cannot be written.
+// Blocks until no other program changes the file, and reads it. The lock lasts as long as the
+// result, so that no change is lost. Without a lock if the file system supports none.
+absl::StatusOr<ContextFile> LockContextFile();
+
+// Replaces the file, or the target of a symbolic link, atomically; only its owner may read it.
+// Creates missing folders. INVALID_ARGUMENT: it cannot be written.
 absl::Status WriteContextFile(const ContextFile& file);
 
 // Returns the reason why the text cannot be a context name; empty if it can.

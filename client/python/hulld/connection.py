@@ -112,14 +112,20 @@ class Connection:
 
     def pem_files(self) -> tuple[bytes | None, bytes | None, bytes | None] | None:
         """The contents of ca_cert, key, and cert, in the order of gRPC's ssl_channel_credentials;
-        None without TLS. OSError: a file cannot be read."""
+        None without TLS. OSError: a file cannot be read. ValueError: the key is encrypted."""
         if self.tls is None:
             return None
 
         def content(path: PathLike | None) -> bytes | None:
             return None if path is None else pathlib.Path(path).read_bytes()
 
-        return content(self.tls.ca_cert), content(self.tls.key), content(self.tls.cert)
+        key = content(self.tls.key)
+        if key is not None and b"ENCRYPTED" in key:
+            # OpenSSL would ask for the passphrase on the terminal.
+            raise ValueError(
+                f"{self.tls.key}: the private key is encrypted; use one without a passphrase"
+            )
+        return content(self.tls.ca_cert), key, content(self.tls.cert)
 
 
 def _with_port(server: Any) -> str:

@@ -199,6 +199,13 @@ def test_a_token_file_must_be_private(tmp_path: pathlib.Path) -> None:
     assert "words" not in str(caught.value)
 
 
+def test_an_encrypted_key_is_refused(tmp_path: pathlib.Path) -> None:
+    key = tmp_path / "key.pem"
+    key.write_text("-----BEGIN ENCRYPTED PRIVATE KEY-----\n")
+    with pytest.raises(ValueError, match="without a passphrase"):
+        hulld.Client("127.0.0.1:1", tls=hulld.Tls(cert=key, key=key))
+
+
 def test_a_certificate_and_its_key_belong_together() -> None:
     with pytest.raises(ValueError, match="belong together"):
         hulld.Tls(cert="a.pem")

@@ -1,5 +1,6 @@
 #include "client/hullctl/context/context_file.h"
 
+#include <absl/strings/str_cat.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -7,6 +8,8 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <thread>
+#include <vector>
 
 #include "tests/client/hullctl/hullctl_on_server.h"
 
@@ -149,6 +152,45 @@ TEST_F(Contexts, AreAddedUsedListedAndRemoved) {
   EXPECT_EQ(RunTool({"context", "remove", "b"}).code, 2);
 }
 
+TEST_F(Contexts, ChangesAtTheSameTimeAreAllKept) {
+  constexpr int kPrograms = 16;
+  std::vector<std::thread> programs;
+  for (int i = 0; i < kPrograms; ++i) {
+    programs.emplace_back([i] {
+      EXPECT_EQ(RunTool({"context", "add", absl::StrCat("c", i), "--server", "a:1"}).code, 0);
+    });
+  }
+  for (std::thread& program : programs) program.join();
+  EXPECT_EQ(ReadContextFile()->contexts.size(), kPrograms);
+}
+
+TEST_F(Contexts, PathsAreAbsolute) {
+  EXPECT_EQ(RunTool({"context", "add", "a", "--server", "unix:socket"}).code, 0);
+  EXPECT_EQ(ReadContextFile()->contexts.at("a").at("server"),
+            "unix:" + (std::filesystem::current_path() / "socket").string());
+}
+
+TEST_F(Contexts, ASymbolicLinkIsKept) {
+  const std::string target = directory_ + "/target.json";
+  Write("");
+  std::filesystem::remove(ContextFilePath());
+  std::ofstream(target) << "{}";
+  std::filesystem::create_symlink(target, ContextFilePath());
+  EXPECT_EQ(RunTool({"context", "add", "a", "--server", "a:1"}).code, 0);
+  EXPECT_TRUE(std::filesystem::is_symlink(ContextFilePath()));
+  EXPECT_EQ(ReadContextFile()->contexts.size(), 1);
+}
+
+TEST_F(Contexts, FlagsOfTheEnvironmentAcceptAnyLetterCase) {
+  for (const char* value : {"true", "True", "YES", "1"}) {
+    setenv("HULLCTL_TLS", value, 1);
+    EXPECT_EQ(SettingsOfEnvironment()->at("tls"), "true") << value;
+  }
+  setenv("HULLCTL_TLS", "Maybe", 1);
+  EXPECT_THAT(std::string(SettingsOfEnvironment().status().message()), HasSubstr("\"Maybe\""));
+  unsetenv("HULLCTL_TLS");
+}
+
 TEST_F(Contexts, OptionThenEnvironmentThenContextThenDefault) {
   const auto server = [](std::vector<std::string> options) {
     options.insert(options.begin(), {"context", "show", "--output", "name"});
@@ -187,6 +229,13 @@ TEST_F(Contexts, UnusableContextsAreNotAdded) {
   EXPECT_THAT(error({"--server", "a:1", "--token-file", token}), HasSubstr("unencrypted"));
   EXPECT_THAT(error({"--server", "a:1", "--ca-cert", "/no/such"}),
               HasSubstr("--ca-cert: /no/such: No such file"));
+  EXPECT_THAT(error({"--server", "a:1", "--ca-cert", directory_}), HasSubstr("Is a directory"));
+  const std::string key = directory_ + "/key";
+  std::ofstream(key) << "-----BEGIN ENCRYPTED PRIVATE KEY-----\n";
+  const std::string certificate = directory_ + "/certificate";
+  std::ofstream(certificate) << "-----BEGIN CERTIFICATE-----\n";
+  EXPECT_THAT(error({"--server", "a:1", "--cert", certificate, "--key", key}),
+              HasSubstr("without a passphrase"));
   EXPECT_TRUE(ReadContextFile()->contexts.empty());
 }
 
