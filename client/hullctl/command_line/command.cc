@@ -6,6 +6,7 @@
 #include <absl/strings/str_split.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <system_error>
@@ -246,7 +247,7 @@ const CommandDescription& CommandLine::LastGiven() const {
 
 std::string CommandLine::Explain(const std::string& text) const {
   const CommandDescription& command = LastGiven();
-  const std::vector<std::string> rest = app_->remaining(/*recurse=*/true);
+  std::vector<std::string> rest = app_->remaining(/*recurse=*/true);
   // For an unknown command, CLI11 also reports a missing one.
   const bool needs_command = LastApp(*app_).get_require_subcommand_min() > 0;
   if (needs_command && !rest.empty() && !IsOption(rest.front())) {
@@ -256,11 +257,15 @@ std::string CommandLine::Explain(const std::string& text) const {
     if (hint.empty() && few) hint = absl::StrCat("; commands: ", absl::StrJoin(known, ", "));
     return absl::StrCat("'", command.path, "' has no command ", Quoted(rest.front()), hint);
   }
+  // CLI11 also returns the "--" that precedes arguments.
+  const bool has_mark = std::erase(rest, "--") > 0;
   for (const std::string& word : rest) {
     if (!IsOption(word)) continue;
     const std::string name = word.substr(0, word.find('='));
     std::vector<std::string> known = OptionNames(command);
     for (const std::string& global : OptionNames(description_)) known.push_back(global);
+    // After "--", the name of an option is an argument.
+    if (has_mark && std::find(known.begin(), known.end(), name) != known.end()) break;
     return absl::StrCat("'", command.path, "' has no option ", Quoted(name),
                         Suggestion(name, known));
   }
@@ -278,8 +283,16 @@ std::string CommandLine::Explain(const std::string& text) const {
 
 std::optional<ExitCode> CommandLine::Parse(const std::vector<std::string>& arguments,
                                            std::ostream& out, std::ostream& err) {
-  // CLI11 expects the arguments in reverse.
-  std::vector<std::string> reversed(arguments.rbegin(), arguments.rend());
+  // CLI11 would take the argument after "--name=" as its value, and expects the reverse order.
+  std::vector<std::string> reversed;
+  const auto end = std::find(arguments.begin(), arguments.end(), "--");
+  for (auto word = arguments.begin(); word != arguments.end(); ++word) {
+    const bool is_empty =
+        word < end && word->starts_with("--") && word->find('=') + 1 == word->size();
+    reversed.push_back(word->substr(0, word->size() - (is_empty ? 1 : 0)));
+    if (is_empty) reversed.emplace_back();
+  }
+  std::reverse(reversed.begin(), reversed.end());
   std::string problem;
   try {
     app_->parse(reversed);
@@ -302,8 +315,9 @@ std::optional<ExitCode> CommandLine::Parse(const std::vector<std::string>& argum
     const std::string name = text.substr(0, text.find(':'));
     const OptionDescription* option = FindOption(LastGiven(), name);
     if (option == nullptr) option = FindOption(description_, name);
-    problem = option == nullptr || !option->takes_value()
-                  ? text
+    problem = option == nullptr || !option->takes_value() ? text
+              : absl::StrContains(text, "At Most")
+                  ? absl::StrCat(name, " may be given only once")
                   : absl::StrCat(name, " needs a value: ", name, " ", option->value_name);
   } catch (const CLI::ParseError& error) {
     problem = error.what();

@@ -170,6 +170,13 @@ TEST_F(HullctlTest, AMistypedWordGetsASuggestion) {
             "hullctl: --output: \"jsn\" is not one of table, wide, name, json; did you mean "
             "\"json\"?");
   EXPECT_EQ(error({"list", "--limit"}), "hullctl: --limit needs a value: --limit N");
+  EXPECT_EQ(error({"list", "--limit=", "3"}),
+            "hullctl: --limit: \"\" is not a whole number from 1 to 1000000000");
+  EXPECT_EQ(error({"list", "--limit", "1", "--limit", "2"}),
+            "hullctl: --limit may be given only once");
+  EXPECT_EQ(error({"create", "--", "a", "--if-absent"}),
+            "hullctl: unexpected argument \"--if-absent\"; usage: hullctl create ID [OPTIONS]");
+  EXPECT_EQ(error({"create", "--", "\xff"}), "hullctl: ID: \"?\" is not UTF-8");
 }
 
 TEST_F(HullctlTest, HelpGroupsCommandsByTaskAndEachHasExamples) {
