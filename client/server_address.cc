@@ -1,12 +1,15 @@
 #include "client/server_address.h"
 
+#include <absl/strings/ascii.h>
 #include <absl/strings/numbers.h>
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_split.h>
 #include <arpa/inet.h>
+#include <sys/un.h>
 
 #include <algorithm>
 #include <cstdint>
+#include <string_view>
 #include <vector>
 
 namespace hulld {
@@ -26,15 +29,32 @@ HostKind KindOf(const std::string& host) {
 
 std::string HostOf(const std::string& server) { return server.substr(0, server.rfind(':')); }
 
+// Returns true for the characters of names and of addresses, which may end in a zone, as in
+// "%eth0".
+bool IsHostCharacter(char c) {
+  return absl::ascii_isalnum(static_cast<unsigned char>(c)) ||
+         std::string_view(".-_[]:%").find(c) != std::string_view::npos;
+}
+
+// gRPC reports these defects as INTERNAL, without a reason.
+absl::Status ValidateSocket(const std::string& server) {
+  const std::string path = server.substr(server.starts_with("unix:///") ? 7 : 5);
+  if (path.empty() || path.starts_with("//")) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("\"", server, "\" is not unix:PATH or unix:///PATH"));
+  }
+  if (path.size() < sizeof(sockaddr_un::sun_path)) return absl::OkStatus();
+  return absl::InvalidArgumentError("the path of a unix socket must have at most 107 characters");
+}
+
 bool IsTargetName(const std::string& server) {
   return server.starts_with("unix:") || server.find(":///") != std::string::npos;
 }
 
 bool IsHostAndPort(const std::string& server) {
   const size_t colon = server.rfind(':');
-  if (colon == std::string::npos || colon == 0 || server.find('/') != std::string::npos) {
-    return false;
-  }
+  if (colon == std::string::npos || colon == 0) return false;
+  if (!std::all_of(server.begin(), server.end(), IsHostCharacter)) return false;
   const std::string port = server.substr(colon + 1);
   const bool is_number =
       std::all_of(port.begin(), port.end(), [](char c) { return c >= '0' && c <= '9'; });
@@ -80,6 +100,7 @@ bool IsList(const std::string& server) {
 }  // namespace
 
 absl::Status ValidateServer(const std::string& server) {
+  if (server.starts_with("unix:")) return ValidateSocket(server);
   if (IsTargetName(server) || IsHostAndPort(server)) return absl::OkStatus();
   if (IsList(server)) return ValidateList(server);
   return absl::InvalidArgumentError(

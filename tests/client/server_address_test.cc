@@ -20,22 +20,25 @@ std::string Problem(const std::string& server) {
 }
 
 TEST(ServerAddress, IsAHostAndPortOrAListOrATargetName) {
-  for (const char* text :
-       {"127.0.0.1:50551", "localhost:1", "[::1]:50551", "hull.example:65535", "unix:/tmp/x",
-        "dns:///hull.example", "10.0.0.1:1,10.0.0.2:1", "[::1]:1,[fe80::1]:2"}) {
+  for (const char* text : {"127.0.0.1:50551", "localhost:1", "[::1]:50551", "hull.example:65535",
+                           "unix:/tmp/x", "unix:x", "unix:///tmp/x", "[fe80::1%eth0]:1",
+                           "dns:///hull.example", "10.0.0.1:1,10.0.0.2:1", "[::1]:1,[fe80::1]:2"}) {
     EXPECT_TRUE(ValidateServer(text).ok()) << text;
   }
   for (const char* text :
        {"", "localhost", ":1", "localhost:", "localhost:0", "localhost:65536", "localhost:http",
-        "localhost:+1", "http://localhost:1", "::1", "1:2:3", ",", "10.0.0.1:1,", "10.0.0.1:1,2"}) {
+        "localhost:+1", "http://localhost:1", "::1", "1:2:3", ",", "10.0.0.1:1,", "10.0.0.1:1,2",
+        " localhost:1", "=localhost:1", "me@localhost:1", "unix:", "unix://x"}) {
     EXPECT_FALSE(ValidateServer(text).ok()) << text;
   }
+  EXPECT_TRUE(ValidateServer("unix:" + std::string(107, 'x')).ok());
+  EXPECT_THAT(Problem("unix:" + std::string(108, 'x')), HasSubstr("at most 107 characters"));
 }
 
 TEST(ServerAddress, InvalidListsSuggestValidOnes) {
   EXPECT_THAT(Problem("a.example:1,b.example:1"), HasSubstr("dns:///hulls.example:50551"));
   EXPECT_THAT(Problem("10.0.0.1:1,[::1]:1"), HasSubstr("use one kind"));
-  EXPECT_THAT(Problem("10.0.0.1:1, 10.0.0.2:1"), HasSubstr("\" 10.0.0.2\""));
+  EXPECT_THAT(Problem("10.0.0.1:1, 10.0.0.2:1"), HasSubstr("\" 10.0.0.2:1\""));
 }
 
 TEST(ServerAddress, ListsBecomeTargetNames) {
