@@ -572,7 +572,11 @@ absl::StatusOr<CommandLine> ParseCommandLine(const std::vector<std::string>& arg
     if (absl::Status s = Parser().Parse(all, &result); !s.ok()) return WithAdvice(s, "");
   }
   if (absl::Status s = CheckStore(result.config); !s.ok()) return WithAdvice(s, "");
-  if (result.config.data_dir.empty()) result.config.data_dir = DefaultDataDir(environment);
+  if (result.config.data_dir.empty()) {
+    all.push_back("--data-dir=" + DefaultDataDir(environment));
+    result = CommandLine();
+    if (absl::Status s = Parser().Parse(all, &result); !s.ok()) return WithAdvice(s, "");
+  }
   return result;
 }
 

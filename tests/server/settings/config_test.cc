@@ -269,6 +269,7 @@ TEST_F(ConfigTest, TheDefaultDataDirectoryFollowsXdg) {
   EXPECT_EQ(Accepted({}).data_dir, "/home/me/.local/state/hulld");
   environment_["XDG_STATE_HOME"] = "/state";
   EXPECT_EQ(Accepted({}).data_dir, "/state/hulld");
+  EXPECT_THAT(Parse({})->settings, HasSubstr("data-dir=\"/state/hulld\""));
   EXPECT_EQ(Accepted({"--data-dir", "here"}).data_dir, "here");
 }
 
