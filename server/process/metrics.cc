@@ -117,6 +117,10 @@ Metrics::Metrics()
       &AddCounter("hulld_points_inside_total", "Points of committed chunks inside the hull.", {})};
   auto& pairs = AddCounters(registry_, "hulld_pairs_total", "Pairs answered, by deciding stage.");
   for (size_t i = 0; i < kRungNames.size(); ++i) pairs_[i] = &pairs.Add({{"rung", kRungNames[i]}});
+  // Exist from the start: the rate of a series does not include its first value.
+  for (const char* const reason : {"unauthenticated", "permission_denied"}) {
+    auth_failures_.Add({{"reason", reason}});
+  }
   AddProcess();
 }
 

@@ -1,5 +1,6 @@
 // Observability: metrics, request IDs, log lines, health.
 
+#include <absl/strings/str_cat.h>
 #include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <grpcpp/generic/generic_stub.h>
@@ -192,6 +193,15 @@ TEST_F(Observation, TokensAreCountedByNameUpToALimit) {
   EXPECT_THAT(text, HasSubstr("hulld_token_requests_total{token=\"t99\"} 1\n"));
   EXPECT_THAT(text, HasSubstr("hulld_token_requests_total{token=\"other\"} 7\n"));
   EXPECT_THAT(text, Not(HasSubstr("token=\"t100\"")));
+}
+
+TEST_F(Observation, AuthenticationFailuresAreCountedFromZero) {
+  const server::Metrics metrics;
+  const std::string text = prometheus::TextSerializer().Serialize(metrics.Collect());
+  for (const char* reason : {"unauthenticated", "permission_denied"}) {
+    EXPECT_THAT(text,
+                HasSubstr(absl::StrCat("hulld_auth_failures_total{reason=\"", reason, "\"} 0\n")));
+  }
 }
 
 TEST_F(Observation, CallsPointsHullsAndPairsAreCounted) {
