@@ -297,6 +297,10 @@ absl::StatusOr<BackupCheck> RestoreBackup(const std::string& path, const std::st
   std::error_code error;
   const fs::path target =
       fs::absolute(fs::path(directory) / ".", error).lexically_normal().parent_path();
+  if (error) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("cannot find ", directory, ": the current directory does not exist"));
+  }
   if (fs::exists(target, error) && !IsFree(target)) {
     return absl::FailedPreconditionError(
         absl::StrCat(directory, " exists and is not empty; choose a new directory"));

@@ -60,7 +60,10 @@ absl::Status CheckDataDir(const std::string& path) {
   // A missing directory will be created in its nearest existing parent.
   std::error_code error;
   std::filesystem::path nearest = std::filesystem::absolute(path, error);
-  while (nearest.has_relative_path() && !std::filesystem::exists(nearest, error)) {
+  if (error) return problem("the current directory", "does not exist");
+  // A dangling link cannot be replaced by a directory.
+  while (nearest.has_relative_path() &&
+         !std::filesystem::exists(std::filesystem::symlink_status(nearest, error))) {
     nearest = nearest.parent_path();
   }
   if (!std::filesystem::is_directory(nearest, error)) {

@@ -20,17 +20,20 @@ struct ContextArguments {
   bool none = false;
 };
 
-// Returns the settings of the options with absolute paths, valid in any working directory.
+// Returns the settings of the options with absolute paths, valid in any working directory. Paths
+// remain as they are if the current directory does not exist.
 ConnectionSettings WithAbsolutePaths(const ConnectionSettings& flags) {
   ConnectionSettings settings = flags;
+  std::error_code error;
+  const std::filesystem::path here = std::filesystem::current_path(error);
   for (const ConnectionSetting& setting : kConnectionSettings) {
     const auto found = settings.find(setting.name);
     if (setting.kind != SettingKind::kFile || found == settings.end()) continue;
-    found->second = std::filesystem::absolute(found->second).lexically_normal().string();
+    found->second = (here / found->second).lexically_normal().string();
   }
   std::string& server = settings.at("server");
   if (server.starts_with("unix:") && server[5] != '/') {
-    server = "unix:" + std::filesystem::absolute(server.substr(5)).lexically_normal().string();
+    server = "unix:" + (here / server.substr(5)).lexically_normal().string();
   }
   return settings;
 }

@@ -95,8 +95,13 @@ std::string FindProgram(const std::string& name) {
   return "";
 }
 
+std::string TemporaryDirectory() {
+  const char* const directory = std::getenv("TMPDIR");
+  return directory == nullptr || *directory == '\0' ? "/tmp" : directory;
+}
+
 absl::StatusOr<int> LocalServer::Spawn(const std::string& program) {
-  std::string folder = (fs::temp_directory_path() / "hullctl-XXXXXX").string();
+  std::string folder = TemporaryDirectory() + "/hullctl-XXXXXX";
   if (mkdtemp(folder.data()) == nullptr) return CannotStart(folder.c_str());
   int input[2];
   int log[2];

@@ -46,6 +46,9 @@ class LocalServer {
 // Returns the absolute path of an executable program on the PATH; empty if there is none.
 std::string FindProgram(const std::string& name);
 
+// Returns $TMPDIR, or /tmp if it is empty or not set.
+std::string TemporaryDirectory();
+
 // Builds hulls on a private server, which is started when the first hull is built.
 class LocalHullBuilder {
  public:

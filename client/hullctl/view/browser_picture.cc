@@ -48,7 +48,7 @@ absl::StatusOr<std::string> FindBrowser() {
 class TemporaryFolder {
  public:
   TemporaryFolder() {
-    std::string pattern = (fs::temp_directory_path() / "hullctl-picture-XXXXXX").string();
+    std::string pattern = TemporaryDirectory() + "/hullctl-picture-XXXXXX";
     if (mkdtemp(pattern.data()) != nullptr) path_ = pattern;
   }
   ~TemporaryFolder() {
@@ -123,8 +123,7 @@ absl::StatusOr<std::string> PictureOf(const std::string& picture_page) {
   const fs::path shown = folder.path() / "shown.html";
   const fs::path log = folder.path() / "log";
   if (folder.path().empty() || !(std::ofstream(page, std::ios::binary) << picture_page).flush()) {
-    return absl::InternalError(
-        absl::StrCat("cannot write to ", fs::temp_directory_path().string()));
+    return absl::InternalError(absl::StrCat("cannot write to ", TemporaryDirectory()));
   }
   std::vector<std::string> arguments = {
       browser, "--headless=new", "--no-first-run", "--mute-audio",

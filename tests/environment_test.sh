@@ -1,5 +1,6 @@
 #!/bin/bash
-# hulld and hullctl with standard streams that are closed or cannot be written: streams_test.sh PROGRAMS
+# hulld and hullctl with standard streams that are closed or full, and in a directory that no longer
+# exists: environment_test.sh PROGRAMS
 set -euo pipefail
 export PATH=$1:$PATH
 work=$(mktemp -d)
@@ -17,6 +18,7 @@ for stream in 1 2; do
   [[ $file == /dev/null ]] || { echo "$file is stream $stream of hulld"; exit 1; }
 done
 hullctl create box --server unix:socket >/dev/null
+hullctl backup save backup --server unix:socket >/dev/null
 kill $server
 wait $server
 
@@ -32,3 +34,22 @@ done
 # The end of the reader ends a program silently.
 hullctl generate sphere 10000 2>errors | head -n 1 >/dev/null || [[ ${PIPESTATUS[0]} == 141 ]]
 [[ ! -s errors ]] || { echo "a closed pipe: $(cat errors)"; exit 1; }
+
+ln -s missing dangling
+! hulld --check-config --data-dir dangling >/dev/null || { echo "a dangling link was accepted"; exit 1; }
+
+# An empty TMPDIR stands for the default.
+TMPDIR='' HULLD_BINARY=$1/hulld hullctl list --local >/dev/null
+code=0
+TMPDIR=$work/missing HULLD_BINARY=$1/hulld hullctl list --local || code=$?
+[[ $code == 2 ]] || { echo "a missing TMPDIR: $code"; exit 1; }
+
+mkdir gone
+cd gone
+rmdir "$work/gone"
+for command in "hullctl context add a --server a:1 --token-file token" \
+  "hullctl backup restore $work/backup --data-dir restored" "hulld --check-config --data-dir store"; do
+  code=0
+  $command >/dev/null || code=$?
+  [[ $code == 2 ]] || { echo "$command ended with $code in a directory that does not exist"; exit 1; }
+done
