@@ -24,6 +24,24 @@ find "$headers" -name '*.h' -printf '#include "%P"\n' | sort >"$work/headers.cc"
 cmake -G Ninja -S "$here/consumer" -B "$work/consumer" -DCMAKE_PREFIX_PATH="$work/prefix" \
   -DCMAKE_CXX_COMPILER="$compiler" >"$work/configure.log"
 cmake --build "$work/consumer" >"$work/build.log" || { cat "$work/build.log"; exit 1; }
+# An installation of core alone, in another folder, needs neither components nor gRPC.
+mkdir "$work/core"
+cp -r "$work/prefix/include" "$work/prefix/lib" "$work/core"
+rm "$work"/core/lib/cmake/hulld/hulld-client-*
+cat >"$work/core/CMakeLists.txt" <<'END'
+cmake_minimum_required(VERSION 3.25)
+project(core LANGUAGES CXX)
+find_package(hulld REQUIRED)
+find_package(hulld QUIET COMPONENTS client)
+if(hulld_FOUND OR NOT TARGET hulld::core)
+  message(FATAL_ERROR "core is not found, or the client is")
+endif()
+END
+cmake -G Ninja -S "$work/core" -B "$work/core/build" -DCMAKE_PREFIX_PATH="$work/core" \
+  -DCMAKE_CXX_COMPILER="$compiler" -DCMAKE_DISABLE_FIND_PACKAGE_gRPC=ON >"$work/core.log"
+# The source tree as a part of another project.
+cmake -G Ninja -S "$here/embedded" -B "$work/embedded" -DCMAKE_CXX_COMPILER="$compiler" >"$work/embedded.log"
+grep -A 9 core_consumer.dir "$work/embedded/build.ninja" | grep -q -- 'FLAGS = .*-ffp-contract=off'
 # The CMake code of client/guide/CPP.md finds the package, too; tests/pages compiles the C++ code.
 mkdir "$work/page"
 pages=$here/../pages client_page=$here/../../client/guide/CPP.md
