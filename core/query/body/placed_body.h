@@ -23,6 +23,7 @@ class PlacedBody {
       : body_(&body), X_WB_(X_WB), radius_(radius) {
     HULLD_DCHECK(IsValidPose(X_WB));
   }
+  PlacedBody(const QueryBody&&, const Pose&, double = 0) = delete;
 
   const QueryBody& body() const { return *body_; }
   const Pose& X_WB() const { return X_WB_; }

@@ -60,6 +60,7 @@ class QueryBody {
   explicit QueryBody(std::vector<BodyPiece> pieces);
   // Wraps a hull. Cost: six support points.
   explicit QueryBody(const QueryHull& hull);
+  explicit QueryBody(const QueryHull&&) = delete;
 
   // True if this wraps a hull, the only piece, without a pose of its own.
   bool is_hull() const { return is_hull_; }

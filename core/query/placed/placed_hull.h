@@ -18,8 +18,10 @@ class PlacedHull {
  public:
   // `hull` must outlive the result. INVALID_ARGUMENT: see ValidatePose.
   static absl::StatusOr<PlacedHull> Make(const QueryHull& hull, const Pose& X_WH);
+  static absl::StatusOr<PlacedHull> Make(const QueryHull&&, const Pose&) = delete;
   // Requires: a valid pose (ValidatePose), and a radius that is finite and not negative.
   PlacedHull(const QueryHull& hull, const Pose& X_WH, double radius = 0);
+  PlacedHull(const QueryHull&&, const Pose&, double = 0) = delete;
   // Places a piece of a body. Both arguments must outlive the result. Exact queries use the exact
   // product, not its rounding, and the exact sum of both radii.
   PlacedHull(const QueryHull& hull, const PoseProduct& X_WH, double radius = 0,

@@ -33,10 +33,12 @@ class QueryHull {
  public:
   // `hull` must outlive the result. Cost: that of a SupportMap and of CenterBounds.
   explicit QueryHull(const Hull& hull) : QueryHull(hull, {}) {}
+  explicit QueryHull(const Hull&&) = delete;
   // CANCELLED: should_stop, which may be empty, returned true. It is polled every few milliseconds.
   // Temporary memory: O(V).
   static absl::StatusOr<QueryHull> Prepare(const Hull& hull,
                                            const std::function<bool()>& should_stop);
+  static absl::StatusOr<QueryHull> Prepare(const Hull&&, const std::function<bool()>&) = delete;
 
   // Null for a version of a LiveHull.
   const Hull* canonical() const { return canonical_; }

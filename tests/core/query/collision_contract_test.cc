@@ -5,11 +5,13 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
 #include "core/hull/growth/hull_builder.h"
 #include "core/query/batch.h"
+#include "core/query/body/placed_body.h"
 #include "core/query/collision.h"
 #include "core/query/floating/float_search.h"
 #include "tests/core/checks/oracle_bridge.h"
@@ -40,6 +42,14 @@ QueryOptions Options(Method method) {
   options.want_analysis = true;
   return options;
 }
+
+// A hull that is prepared or placed must outlive the result, so it cannot be a temporary.
+static_assert(!std::is_constructible_v<QueryHull, Hull>);
+static_assert(!std::is_constructible_v<PlacedHull, QueryHull, Pose>);
+static_assert(!std::is_constructible_v<QueryBody, QueryHull>);
+static_assert(!std::is_constructible_v<PlacedBody, QueryBody, Pose>);
+static_assert(std::is_constructible_v<QueryHull, Hull&>);
+static_assert(std::is_constructible_v<PlacedHull, const QueryHull&, Pose>);
 
 TEST(Collision, AnEmptyHullIsSeparatedFromAll) {
   const Hull empty;
