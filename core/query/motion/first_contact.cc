@@ -60,13 +60,16 @@ FirstContact Mirrored(FirstContact contact) {
 }
 
 absl::Status ValidateMoving(const char* name, const MovingHull& moving) {
-  const absl::Status status = ValidateMotion(moving.X_WB);
+  absl::Status status = ValidateMotion(moving.X_WB);
+  if (status.ok()) status = ValidatePose(moving.X_BH);
   if (!status.ok()) {
     return absl::InvalidArgumentError(absl::StrCat(name, ": ", status.message()));
   }
-  if (!(moving.radius >= 0 && moving.radius <= kLargestDouble)) {
-    return absl::InvalidArgumentError(
-        absl::StrCat(name, ": radius is ", moving.radius, "; it must be finite and at least 0"));
+  for (const double radius : {moving.radius, moving.piece_radius}) {
+    if (!(radius >= 0 && radius <= kLargestDouble)) {
+      return absl::InvalidArgumentError(
+          absl::StrCat(name, ": radius is ", radius, "; it must be finite and at least 0"));
+    }
   }
   return absl::OkStatus();
 }

@@ -26,7 +26,7 @@ struct MovingHull {
   const QueryHull& hull;
   Motion X_WB;
   double radius = 0;
-  // The pose of the piece in its body. Requires: a valid pose (ValidatePose).
+  // The pose of the piece in its body.
   Pose X_BH = {};
   double piece_radius = 0;
 
@@ -101,9 +101,9 @@ struct FirstContact {
 // kWithinTolerance only within the resolution. Swapping A and B mirrors the answer. Empty hulls are
 // separated from everything.
 //
-// INVALID_ARGUMENT: ValidateMotion, ValidateMotionOptions; a radius is negative or not finite; or,
-// unless the pair meets earlier, no plane can be proven because a rotation nearly vanishes (all
-// components of q(t) are below 2^-38 of the largest at the ends) or a size is outside
+// INVALID_ARGUMENT: ValidateMotion, ValidatePose, ValidateMotionOptions; a radius is negative or
+// not finite; or, unless the pair meets earlier, no plane can be proven because a rotation nearly
+// vanishes (all components of q(t) are below 2^-38 of the largest at the ends) or a size is outside
 // [kMotionMinSize, kMotionMaxSize]. CANCELLED: should_stop returned true.
 absl::StatusOr<FirstContact> FindFirstContact(const MovingHull& a, const MovingHull& b,
                                               const MotionOptions& options = {});

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "core/query/motion/first_contact.h"
@@ -359,6 +360,18 @@ TEST(Turning, RoundedShapesOfExtremeSizeAreRefused) {
         0.5 * scale);
     const absl::Status status = FindFirstContact(a.moving(), b.moving()).status();
     EXPECT_TRUE(absl::IsInvalidArgument(status)) << status;
+  }
+}
+
+TEST(Turning, PosesAndRadiiOfPiecesAreValidated) {
+  const OwnMoving cube(Box(1, 1, 1), AtRest());
+  MovingHull placed = cube.moving();
+  placed.X_BH.q = {0, 0, 0, 0};
+  EXPECT_TRUE(absl::IsInvalidArgument(FindFirstContact(placed, cube.moving()).status()));
+  MovingHull piece = cube.moving();
+  for (const double radius : {-1.0, std::numeric_limits<double>::quiet_NaN()}) {
+    piece.piece_radius = radius;
+    EXPECT_TRUE(absl::IsInvalidArgument(FindFirstContact(cube.moving(), piece).status()));
   }
 }
 
