@@ -7,6 +7,8 @@
 #include <cmath>
 #include <limits>
 
+#include "core/numeric/ieee_arithmetic.h"
+
 namespace hulld {
 
 inline constexpr double kInfinity = std::numeric_limits<double>::infinity();

@@ -19,6 +19,7 @@
 #include "core/hull/surface/surface.h"
 #include "core/hull/surface/vertex_table.h"
 #include "core/numeric/exponent_limits.h"
+#include "core/numeric/ieee_arithmetic.h"
 #include "core/numeric/orientation.h"
 
 namespace hulld {
@@ -251,7 +252,7 @@ class HullBuilder::State {
   KeptBefore<Before> before_;
 };
 
-HullBuilder::HullBuilder() : state_(std::make_unique<State>()) {}
+HullBuilder::HullBuilder() : state_(std::make_unique<State>()) { HULLD_CHECK(HasIeeeArithmetic()); }
 HullBuilder::HullBuilder(const HullBuilder& other)
     : state_(std::make_unique<State>(*other.state_)), undo_bytes_(other.undo_bytes_) {}
 HullBuilder& HullBuilder::operator=(const HullBuilder& other) {

@@ -5,13 +5,16 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/base/check.h"
 #include "core/numeric/error_bounds.h"
+#include "core/numeric/ieee_arithmetic.h"
 #include "core/query/placed/live_parts.h"
 
 namespace hulld {
 
 QueryHull::QueryHull(const Hull& hull, const std::function<bool()>& should_stop)
     : canonical_(&hull) {
+  HULLD_CHECK(HasIeeeArithmetic());
   if (hull.empty()) return;
   auto base = std::make_shared<const HullBase>(hull, should_stop);
   dimension_ = hull.dimension();
