@@ -41,10 +41,14 @@ std::shared_ptr<grpc::Channel> Connect(const ClientOptions& options) {
   return OpenChannel(options.server, options.security, arguments);
 }
 
-// A longer timeout would overflow the clocks.
+// Limits a timeout to what the clocks can add without overflow.
+std::chrono::milliseconds WithinClocks(std::chrono::milliseconds timeout) {
+  constexpr std::chrono::milliseconds kLongest = std::chrono::hours(24 * 365);
+  return std::clamp(timeout, std::chrono::milliseconds::zero(), kLongest);
+}
+
 ClientOptions WithFiniteTimeout(ClientOptions options) {
-  constexpr auto kLongest = std::chrono::hours(24 * 365);
-  options.timeout = std::min<std::chrono::milliseconds>(options.timeout, kLongest);
+  options.timeout = WithinClocks(options.timeout);
   return options;
 }
 
@@ -203,7 +207,9 @@ absl::StatusOr<v1::ReplaceHullResponse> Client::ReplaceHull(
     const v1::ReplaceOpen& open, const PointFeed& feed,
     std::optional<std::chrono::milliseconds> timeout) const {
   grpc::ClientContext context;
-  if (timeout.has_value()) context.set_deadline(std::chrono::system_clock::now() + *timeout);
+  if (timeout.has_value()) {
+    context.set_deadline(std::chrono::system_clock::now() + WithinClocks(*timeout));
+  }
   v1::ReplaceHullResponse response;
   const auto writer = hulls_->ReplaceHull(&context, &response);
   v1::ReplaceHullRequest request;
@@ -244,7 +250,9 @@ absl::Status Client::SaveBackup(
     const std::function<absl::Status(const v1::SaveBackupResponse&)>& receive,
     std::optional<std::chrono::milliseconds> timeout) const {
   grpc::ClientContext context;
-  if (timeout.has_value()) context.set_deadline(std::chrono::system_clock::now() + *timeout);
+  if (timeout.has_value()) {
+    context.set_deadline(std::chrono::system_clock::now() + WithinClocks(*timeout));
+  }
   const auto reader = maintenance_->SaveBackup(&context, v1::SaveBackupRequest());
   v1::SaveBackupResponse part;
   while (reader->Read(&part)) {

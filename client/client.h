@@ -32,7 +32,8 @@ namespace hulld {
 inline constexpr char kDefaultServer[] = "127.0.0.1:50551";
 
 struct ClientOptions {
-  // HOST:PORT, or several servers over one store; see server_address.h.
+  // HOST:PORT, or several servers over one store; see server_address.h. ValidateServer checks it
+  // beforehand. Without a port, gRPC connects to port 443.
   std::string server = kDefaultServer;
   // Timeout of each call, including retries. An append stream may last longer; for it, the timeout
   // bounds the wait for the next acknowledgement.
@@ -60,8 +61,10 @@ struct HullMesh {
   size_t vertex_count() const { return xyz.size() / 3; }
 };
 
-// A connection to hulld. Connects on first use. Thread-safe. gRPC does not survive a fork: after a
-// process has used a client, its forked children must not use one unless they call exec.
+// A connection to hulld. Connects on first use. Thread-safe. Movable; a moved-from client may only
+// be destroyed or assigned to. Streams and watches may outlive their client. gRPC does not survive
+// a fork: after a process has used a client, its forked children must not use one unless they call
+// exec.
 //
 // Errors carry the server's code and message. UNAVAILABLE and DEADLINE_EXCEEDED mean that no answer
 // arrived. Calls that are safe to repeat are retried by options.retry until their deadline, after

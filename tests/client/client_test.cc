@@ -124,6 +124,16 @@ TEST_F(ClientTest, TheLongestTimeoutIsAccepted) {
   EXPECT_TRUE(hull.ok()) << hull.status();
 }
 
+TEST_F(ClientTest, NegativeTimeoutsAreNoLongerThanZero) {
+  fake_.PutHull("a", {});
+  const auto least = std::chrono::milliseconds::min();
+  const auto hull = MakeClient(least).GetHull("a");
+  EXPECT_TRUE(absl::IsDeadlineExceeded(hull.status())) << hull.status();
+  const absl::Status saved =
+      MakeClient().SaveBackup([](const auto&) { return absl::OkStatus(); }, least);
+  EXPECT_TRUE(absl::IsDeadlineExceeded(saved)) << saved;
+}
+
 TEST_F(ClientTest, AMissingServerIsUnavailable) {
   ClientOptions options;
   options.server = "127.0.0.1:1";
