@@ -511,8 +511,8 @@ class Client(ClientBase):
         the direction is that of the ray.
 
         origins, directions: n x 3; either may have shape (3,), for all rays. placements: as in
-        check_collisions; the pieces of a body must be at the identity pose. Groups of pairs that
-        are far apart are skipped together, as in find_collisions.
+        check_collisions. Groups of pairs that are far apart are skipped together, as in
+        find_collisions.
 
         HulldError: a placement has no answer, for example because its hull does not exist.
         """
