@@ -273,6 +273,10 @@ class Parser {
   }
 
   absl::Status UnknownArgument(const std::string& argument) const {
+    if (argument == "doctor" || argument == "migrate") {
+      return absl::InvalidArgumentError(
+          absl::StrCat("\"", argument, "\" must come first, as in 'hulld ", argument, " --help'"));
+    }
     if (!argument.starts_with("-")) {
       return absl::InvalidArgumentError(absl::StrCat("unexpected argument \"", argument, "\"",
                                                      Hint(argument, {"doctor", "migrate"})));

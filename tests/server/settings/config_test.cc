@@ -207,6 +207,8 @@ TEST_F(ConfigTest, ErrorsNameFlagVariableOrKey) {
 TEST_F(ConfigTest, AMisspelledNameIsRefusedWithTheNearestOne) {
   ExpectRefused({"--lisen=127.0.0.1:1"}, "unknown flag --lisen; did you mean --listen?");
   ExpectRefused({"--max-hull", "3"}, "unknown flag --max-hull; did you mean --max-hulls?");
+  ExpectRefused({"--log-level", "info", "doctor"},
+                "\"doctor\" must come first, as in 'hulld doctor --help'");
   ExpectRefused({"docter"}, "unexpected argument \"docter\"; did you mean doctor?");
   const std::string file = WriteFile("# limits\nmax-hull = 3\n");
   ExpectRefused({"--config", file}, file + ":2: unknown key \"max-hull\"; did you mean max-hulls?");
