@@ -1,14 +1,14 @@
 #include "client/verify/exact_vector.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 
 #include "client/base/check.h"
 
 namespace hulld {
 namespace {
-
-constexpr int kMantissaBits = 53;
 
 // mantissa (53 bits) * 2^exponent.
 struct Parts {
@@ -16,11 +16,17 @@ struct Parts {
   int exponent;
 };
 
+// Reads the bits, because arithmetic takes subnormal numbers for zero in a program that was linked
+// with -ffast-math.
 Parts Split(double number) {
-  int exponent = 0;
-  const double fraction = std::frexp(number, &exponent);
-  auto mantissa = static_cast<int64_t>(std::ldexp(fraction, kMantissaBits));
-  exponent -= kMantissaBits;
+  constexpr int kFractionBits = 52;
+  constexpr int kLeastExponent = -1074;
+  const auto bits = std::bit_cast<uint64_t>(number);
+  const auto biased = static_cast<int>(bits >> kFractionBits & 0x7FF);
+  const int64_t leading = biased > 0 ? int64_t{1} << kFractionBits : 0;
+  int64_t mantissa = leading | static_cast<int64_t>(bits & ((uint64_t{1} << kFractionBits) - 1));
+  if (std::signbit(number)) mantissa = -mantissa;
+  int exponent = kLeastExponent + std::max(biased - 1, 0);
   while (mantissa != 0 && mantissa % 2 == 0) {
     mantissa /= 2;
     ++exponent;
@@ -82,7 +88,8 @@ class Ball {
 
 void CommonExponent::Include(double number) {
   HULLD_CLIENT_CHECK(std::isfinite(number));
-  if (number != 0) exponent_ = std::min(exponent_, Split(number).exponent);
+  const Parts parts = Split(number);
+  if (parts.mantissa != 0) exponent_ = std::min(exponent_, parts.exponent);
 }
 
 BigInteger CommonExponent::ToInteger(double number) const {

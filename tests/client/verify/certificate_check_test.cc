@@ -4,11 +4,13 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <random>
 #include <utility>
 #include <vector>
 
+#include "client/verify/exact_vector.h"
 #include "tests/oracle/brute_force_relation.h"
 #include "tests/test_size.h"
 
@@ -102,6 +104,26 @@ void ExpectValid(v1::Relation relation, const v1::Certificate& certificate, cons
   const absl::Status status = Check(relation, certificate, a, b);
   EXPECT_TRUE(status.ok()) << status.ToString();
 }
+
+#ifdef __x86_64__
+// As in a program that was linked with -ffast-math.
+TEST(CommonExponent, IncludesSubnormalNumbersIfTheProcessorFlushesThem) {
+  constexpr uint32_t kFlush = 0x8040;
+  const double numbers[] = {kMin, -3 * kMin, 0x1p-1030, 1};
+  const uint32_t before = __builtin_ia32_stmxcsr();
+  __builtin_ia32_ldmxcsr(before | kFlush);
+  CommonExponent exponent;
+  exponent.Include(numbers);
+  const BigInteger least = exponent.ToInteger(numbers[0]);
+  const BigInteger negative = exponent.ToInteger(numbers[1]);
+  __builtin_ia32_ldmxcsr(before);
+  EXPECT_EQ(exponent.exponent(), -1074);
+  EXPECT_EQ(least, 1);
+  EXPECT_EQ(negative, -3);
+  EXPECT_EQ(exponent.ToInteger(numbers[2]), BigInteger(1) << 44);
+  EXPECT_EQ(exponent.ToInteger(numbers[3]), BigInteger(1) << 1074);
+}
+#endif
 
 TEST(CertificateCheck, ADirectionSeparatesOrNotByOneUlp) {
   const Hull a = At(Cube());
