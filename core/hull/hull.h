@@ -26,7 +26,8 @@ struct Edge {
 // Facets are maximal coplanar polygons, each from its lowest vertex, counter-clockwise seen from
 // outside, sorted by their vertex sequences. A hull of dimension 2 has one facet, which represents
 // both its sides (its second vertex is lower than its last); dimension 1 has no facet and one edge,
-// dimension 0 one vertex, dimension -1 nothing. Edges are sorted.
+// dimension 0 one vertex, dimension -1 nothing. Edges are sorted. A moved-from hull may only be
+// destroyed or assigned to.
 class Hull {
  public:
   Hull() = default;

@@ -50,7 +50,7 @@ struct AddLimits {
 // Every decision is the exact sign of a determinant of the input doubles, subnormals and 1e308
 // included. The vertex set is therefore minimal (no duplicate, no point inside an edge or a facet)
 // and depends on the point set alone. The dimension grows from -1 through 0, 1 and 2 to 3 as points
-// arrive. Copyable; not thread-safe.
+// arrive. Copyable; a moved-from builder may only be destroyed or assigned to. Not thread-safe.
 class HullBuilder {
  public:
   HullBuilder();
