@@ -10,6 +10,7 @@
 #include "client/hullctl/printing/answer_text.h"
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/printing/progress_bar.h"
+#include "client/hullctl/scene/scene_sync.h"
 #include "client/verify/answer_check.h"
 #include "client/verify/motion_check.h"
 
@@ -272,6 +273,7 @@ class BatchRun {
 ExitCode Batch(const Invocation& run, const BatchArguments& arguments) {
   HULLD_ASSIGN_OR_FAIL(run.FailUsage, const auto scene,
                        ReadWholeScene(arguments.file, "batch", FormFor(arguments.details)));
+  if (auto put = PutSceneIfLocal(run, arguments.file); !put.ok()) return run.Fail(put);
   return AnswerPairs(run, arguments.file, scene, arguments.details, arguments.colliding);
 }
 

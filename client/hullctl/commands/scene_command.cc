@@ -11,6 +11,7 @@
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/printing/progress_bar.h"
 #include "client/hullctl/printing/table.h"
+#include "client/hullctl/scene/scene_sync.h"
 
 namespace hulld {
 namespace {
@@ -144,6 +145,7 @@ ExitCode FindInScene(const Invocation& run, const SceneArguments& arguments) {
   }
   HULLD_ASSIGN_OR_FAIL(run.FailUsage, auto read,
                        ReadWholeScene(arguments.file, "scene", FormFor(arguments.details)));
+  if (auto put = PutSceneIfLocal(run, arguments.file); !put.ok()) return run.Fail(put);
   if (read.pairs.has_value()) {
     return run.FailUsage(
         absl::StrCat(arguments.file,
@@ -156,6 +158,7 @@ ExitCode FindInScene(const Invocation& run, const SceneArguments& arguments) {
 ExitCode CheckScene(const Invocation& run, const SceneArguments& arguments) {
   HULLD_ASSIGN_OR_FAIL(run.FailUsage, auto read,
                        ReadWholeScene(arguments.file, "scene", FormFor(arguments.details)));
+  if (auto put = PutSceneIfLocal(run, arguments.file); !put.ok()) return run.Fail(put);
   if (read.pairs.has_value()) {
     const char* const option = arguments.nearest > 0   ? "--nearest"
                                : arguments.first       ? "--first"

@@ -16,7 +16,6 @@
 #include "client/hullctl/robot/robot_scene.h"
 #include "client/hullctl/scene/recorded_watch.h"
 #include "client/hullctl/scene/scene_sync.h"
-#include "client/hullctl/scene/yaml_scene.h"
 #include "client/hullctl/view/bridge/bridge.h"
 #include "client/hullctl/view/bridge/page_html.h"
 #include "client/hullctl/view/browser_picture.h"
@@ -199,21 +198,14 @@ class Viewing {
     RobotSceneArguments robot = arguments_.robot;
     robot.robot.urdf = arguments_.things[0];
     robot.scene = arguments_.scene;
-    HULLD_RETURN_IF_ERROR(robot.scene.empty() ? absl::OkStatus() : PutSceneIfLocal(robot.scene));
+    HULLD_RETURN_IF_ERROR(PutSceneIfLocal(run_, robot.scene));
     return AddRobot(robot, program_.client, &temporary_, scene);
   }
 
   absl::Status AddTheScene(ViewScene* scene) {
     const std::string& path = arguments_.things[0];
-    const absl::Status put = PutSceneIfLocal(path);
+    const absl::Status put = PutSceneIfLocal(run_, path);
     return put.ok() ? AddSceneFile(path, scene) : put;
-  }
-
-  // With --local, the server receives the hulls and bodies that the scene defines.
-  absl::Status PutSceneIfLocal(const std::string& path) {
-    if (!run_.local) return absl::OkStatus();
-    const auto description = ReadYamlScene(path);
-    return description.ok() ? PutAll(program_.client, *description) : absl::OkStatus();
   }
 
   // Reads the shape from the file. With --local, the hull is registered on the local server; any

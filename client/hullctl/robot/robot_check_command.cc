@@ -21,6 +21,7 @@
 #include "client/hullctl/robot/waypoint_source.h"
 #include "client/hullctl/robot/waypoint_stream.h"
 #include "client/hullctl/scene/scene_file.h"
+#include "client/hullctl/scene/scene_sync.h"
 #include "client/hullctl/view/view_scene.h"
 #include "client/packed_placements.h"
 #include "client/robot/joint_file.h"
@@ -148,6 +149,7 @@ absl::Status RobotCheck::AddScene() {
   if (arguments_.scene.empty()) return absl::OkStatus();
   HULLD_ASSIGN_OR_RETURN(const auto source, ByteSource::Open(arguments_.scene));
   HULLD_ASSIGN_OR_RETURN(scene_, ReadScene(source.get()));
+  HULLD_RETURN_IF_ERROR(PutSceneIfLocal(run_, arguments_.scene));
   for (uint32_t i = 0; i < scene_.size(); ++i) {
     names_.push_back(scene_.NameOf(i));
     around_.hulls.push_back(*scene_.HullOf(i));

@@ -61,12 +61,17 @@ absl::StatusOr<Change> CompareBody(const Client& client, const BodyDefinition& b
   return same ? Change::kNone : Change::kReplace;
 }
 
-absl::Status PutAll(const Client& client, const SceneDescription& scene) {
-  for (const HullDefinition& hull : scene.hulls) {
+absl::Status PutSceneIfLocal(const Invocation& run, const std::string& path) {
+  if (!run.local || path == "-") return absl::OkStatus();
+  const auto scene = ReadYamlScene(path);
+  // The command itself reports errors of the file.
+  if (!scene.ok()) return absl::OkStatus();
+  const Client client = run.MakeClient();
+  for (const HullDefinition& hull : scene->hulls) {
     HULLD_ASSIGN_OR_RETURN(const auto xyz, PointsOf(hull));
     HULLD_RETURN_IF_ERROR(client.PutHull(hull.hull_id, xyz));
   }
-  for (const BodyDefinition& body : scene.bodies) {
+  for (const BodyDefinition& body : scene->bodies) {
     HULLD_RETURN_IF_ERROR(client.PutBody(BodyRequest(body)).status());
   }
   return absl::OkStatus();

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "client/client.h"
+#include "client/hullctl/command_line/invocation.h"
 #include "client/hullctl/scene/scene_description.h"
 
 namespace hulld {
@@ -29,9 +30,10 @@ absl::StatusOr<Change> Compare(const Client& client, const std::string& hull_id,
 // equal numbers. Read-only.
 absl::StatusOr<Change> CompareBody(const Client& client, const BodyDefinition& body);
 
-// Replaces all hulls and bodies that the scene defines. Returns the first error, of a definition as
-// in PointsOf or of a call.
-absl::Status PutAll(const Client& client, const SceneDescription& scene);
+// With --local, registers the hulls and bodies that a YAML scene defines; the server has no others.
+// Ignores standard input and other files. Returns the first error, of a definition as in PointsOf
+// or of a call.
+absl::Status PutSceneIfLocal(const Invocation& run, const std::string& path);
 
 // A hull or a body of the server.
 struct ServerObject {

@@ -141,6 +141,21 @@ TEST_F(Files, OfManyVerticesNeedALocalServer) {
   EXPECT_EQ(local.out, "OVERLAPPING\n");
 }
 
+TEST_F(Files, OfScenesDefineTheHullsOfALocalServer) {
+  const std::string path = (folder_ / "scene.yaml").string();
+  std::ofstream(path) << "hulls: {box: {points: [[0,0,0], [1,0,0], [0,1,0], [0,0,1]]}}\n"
+                         "bodies: {pair: [{hull: box}, {hull: box, at: [5, 0, 0]}]}\n"
+                         "place: {a: {hull: box}, b: {body: pair, at: [-5, 0, 0]}}\n";
+  for (const std::vector<std::string>& command :
+       {std::vector<std::string>{"scene"}, {"scene", "check"}, {"batch"}}) {
+    std::vector<std::string> arguments = command;
+    arguments.insert(arguments.end(), {path, "--local", "--output", "name"});
+    const Ran ran = RunTool(arguments);
+    EXPECT_EQ(ran.code, 0) << ran.err;
+    EXPECT_THAT(ran.out, HasSubstr("a\tb\tOVERLAPPING"));
+  }
+}
+
 TEST_F(Files, AreNamedInErrors) {
   EXPECT_THAT(Run({"check", "./part", "./part"}).err, HasSubstr("./part"));
   EXPECT_THAT(Run({"check", (folder_ / "none.stl").string(), "a"}).err, HasSubstr("none.stl"));
