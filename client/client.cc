@@ -41,14 +41,14 @@ std::shared_ptr<grpc::Channel> Connect(const ClientOptions& options) {
   return OpenChannel(options.server, options.security, arguments);
 }
 
-// Limits a timeout to what the clocks can add without overflow.
-std::chrono::milliseconds WithinClocks(std::chrono::milliseconds timeout) {
+// Returns the timeout, or the nearest one from 0 to a year, which no clock overflows.
+std::chrono::milliseconds BoundTimeout(std::chrono::milliseconds timeout) {
   constexpr std::chrono::milliseconds kLongest = std::chrono::hours(24 * 365);
   return std::clamp(timeout, std::chrono::milliseconds::zero(), kLongest);
 }
 
 ClientOptions WithFiniteTimeout(ClientOptions options) {
-  options.timeout = WithinClocks(options.timeout);
+  options.timeout = BoundTimeout(options.timeout);
   return options;
 }
 
@@ -208,7 +208,7 @@ absl::StatusOr<v1::ReplaceHullResponse> Client::ReplaceHull(
     std::optional<std::chrono::milliseconds> timeout) const {
   grpc::ClientContext context;
   if (timeout.has_value()) {
-    context.set_deadline(std::chrono::system_clock::now() + WithinClocks(*timeout));
+    context.set_deadline(std::chrono::system_clock::now() + BoundTimeout(*timeout));
   }
   v1::ReplaceHullResponse response;
   const auto writer = hulls_->ReplaceHull(&context, &response);
@@ -251,7 +251,7 @@ absl::Status Client::SaveBackup(
     std::optional<std::chrono::milliseconds> timeout) const {
   grpc::ClientContext context;
   if (timeout.has_value()) {
-    context.set_deadline(std::chrono::system_clock::now() + WithinClocks(*timeout));
+    context.set_deadline(std::chrono::system_clock::now() + BoundTimeout(*timeout));
   }
   const auto reader = maintenance_->SaveBackup(&context, v1::SaveBackupRequest());
   v1::SaveBackupResponse part;

@@ -13,11 +13,10 @@ namespace {
 // Opens /dev/null in place of each closed standard stream. Otherwise, a file or socket would get
 // its number, and output would be written to it. Writing to such a stream still fails.
 void FillStandardStreams() {
-  int opened = 0;
-  do {
-    opened = open("/dev/null", O_RDONLY);
-  } while (opened >= 0 && opened <= STDERR_FILENO);
-  if (opened > STDERR_FILENO) close(opened);
+  // open returns the lowest free number.
+  for (int stream = STDIN_FILENO; stream <= STDERR_FILENO; ++stream) {
+    if (fcntl(stream, F_GETFD) < 0) open("/dev/null", O_RDONLY);
+  }
 }
 
 }  // namespace

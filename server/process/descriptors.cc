@@ -37,11 +37,10 @@ void RaiseDescriptorLimit() {
 }
 
 void FillStandardStreams() {
-  int opened = 0;
-  do {
-    opened = open("/dev/null", O_RDONLY);
-  } while (opened >= 0 && opened <= STDERR_FILENO);
-  if (opened > STDERR_FILENO) close(opened);
+  // open returns the lowest free number.
+  for (int stream = STDIN_FILENO; stream <= STDERR_FILENO; ++stream) {
+    if (fcntl(stream, F_GETFD) < 0) open("/dev/null", O_RDONLY);
+  }
 }
 
 }  // namespace hulld::server

@@ -146,7 +146,8 @@ absl::Status Committer::Write(std::vector<Pending>& batch) {
   if (was_failing) status = store_.Recover();
   const auto start = std::chrono::steady_clock::now();
   if (status.ok()) status = store_.Commit(changes);
-  // A backup may have filled the disk, unnoticed by this class. Deletions succeed on a full disk.
+  // The disk may have been full before, for example because of a backup. Deletions succeed once the
+  // store has recovered, because that releases its reserve.
   if (absl::IsResourceExhausted(status) && !was_failing &&
       std::ranges::all_of(changes, &Change::deleted)) {
     status = store_.Recover();

@@ -106,7 +106,7 @@ void ExpectValid(v1::Relation relation, const v1::Certificate& certificate, cons
 }
 
 #ifdef __x86_64__
-// As in a program that was linked with -ffast-math.
+// Sets the processor to the mode that linking with -ffast-math gives to the whole program.
 TEST(CommonExponent, IncludesSubnormalNumbersIfTheProcessorFlushesThem) {
   constexpr uint32_t kFlush = 0x8040;
   const double numbers[] = {kMin, -3 * kMin, 0x1p-1030, 1};

@@ -26,7 +26,7 @@ TEST(IeeeArithmetic, OtherRoundingModesAreDetected) {
 constexpr uint32_t kFlushResults = 0x8000;
 constexpr uint32_t kFlushOperands = 0x0040;
 
-// The mode of a program that was linked with -ffast-math.
+// Linking with -ffast-math sets both flags for the whole program.
 TEST(IeeeArithmetic, FlushedSubnormalNumbersAreDetected) {
   const uint32_t before = __builtin_ia32_stmxcsr();
   for (const uint32_t flags : {kFlushResults, kFlushOperands, kFlushResults | kFlushOperands}) {
