@@ -51,11 +51,12 @@ FrameGuard::FrameGuard(const FrameLimits& limits, HalfOpenTotals& all_half_open,
       all_half_open_(all_half_open),
       preface_left_(kPreface.size()),
       refilled_(now),
-      control_{limits.control_frames * limits.first_share},
-      resets_{limits.resets * limits.first_share},
-      late_data_{limits.late_data},
-      large_headers_{limits.large_header_bytes * limits.first_share},
-      window_updates_{limits.window_updates * limits.first_share} {}
+      control_{limits.control_frames, limits.control_frames.burst * limits.first_share},
+      resets_{limits.resets, limits.resets.burst * limits.first_share},
+      late_data_{limits.late_data, limits.late_data.burst},
+      large_headers_{limits.large_header_bytes,
+                     limits.large_header_bytes.burst * limits.first_share},
+      window_updates_{limits.window_updates, limits.window_updates.burst * limits.first_share} {}
 
 FrameGuard::~FrameGuard() {
   all_half_open_.streams -= half_open_.size();
@@ -67,19 +68,8 @@ bool FrameGuard::Bucket::Take(double count) {
   return tokens >= 0;
 }
 
-void FrameGuard::Refill(Clock::time_point now) {
-  const double passed = std::chrono::duration<double>(now - refilled_).count();
-  refilled_ = now;
-  control_.tokens = std::min(limits_.control_frames,
-                             control_.tokens + passed * limits_.control_frames_per_second);
-  resets_.tokens = std::min(limits_.resets, resets_.tokens + passed * limits_.resets_per_second);
-  late_data_.tokens =
-      std::min(limits_.late_data, late_data_.tokens + passed * limits_.late_data_per_second);
-  large_headers_.tokens =
-      std::min(limits_.large_header_bytes,
-               large_headers_.tokens + passed * limits_.large_header_bytes_per_second);
-  window_updates_.tokens = std::min(
-      limits_.window_updates, window_updates_.tokens + passed * limits_.window_updates_per_second);
+void FrameGuard::Bucket::Refill(double seconds) {
+  tokens = std::min(rate.burst, tokens + seconds * rate.per_second);
 }
 
 uint32_t FrameGuard::Frame::stream() const {
@@ -106,7 +96,11 @@ bool FrameGuard::Frame::TakeHeader(std::string_view& bytes) {
 }
 
 FrameGuard::Verdict FrameGuard::Take(std::string_view bytes, Clock::time_point now) {
-  Refill(now);
+  const double passed = std::chrono::duration<double>(now - refilled_).count();
+  refilled_ = now;
+  for (Bucket* bucket : {&control_, &resets_, &late_data_, &large_headers_, &window_updates_}) {
+    bucket->Refill(passed);
+  }
   while (!bytes.empty()) {
     if (preface_left_ > 0) {
       const size_t taken = std::min(preface_left_, bytes.size());

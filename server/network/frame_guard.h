@@ -14,25 +14,27 @@ namespace hulld::server {
 
 // Limits on the HTTP/2 frames of a client. No gRPC client comes near them.
 struct FrameLimits {
+  // A number that is available immediately, and its growth.
+  struct Rate {
+    double burst;
+    double per_second;
+  };
+
   // Bytes of a header block: HEADERS with its CONTINUATION frames. gRPC refuses headers above 8
   // KiB, but parses any number of bytes first.
   size_t header_block_bytes = 16 << 10;
   // RST_STREAM frames. Each costs gRPC 100 to 200 us (**observed**). The burst covers a client that
   // cancels all of its calls; the rate, a client with short deadlines.
-  double resets = 256;
-  double resets_per_second = 500;
+  Rate resets = {256, 500};
   // Other frames without a request that gRPC answers or allocates memory for: PING, SETTINGS,
   // PRIORITY, GOAWAY, CONTINUATION, trailers, empty or padded DATA, unknown types.
-  double control_frames = 1000;
-  double control_frames_per_second = 200;
+  Rate control_frames = {1000, 200};
   // DATA of streams that are not open: gRPC reads it faster than it returns to other connections.
   // The burst, which first_share does not reduce, covers the data in flight when the server ends an
   // upload.
-  double late_data = 1000;
-  double late_data_per_second = 1000;
+  Rate late_data = {1000, 1000};
   // Bytes of header blocks beyond kUsualHeaderBytes each.
-  double large_header_bytes = 256 << 10;
-  double large_header_bytes_per_second = 64 << 10;
+  Rate large_header_bytes = {256 << 10, 64 << 10};
   static constexpr size_t kUsualHeaderBytes = 1024;
   // Half-open streams of a single connection, and of all connections: streams with an incomplete
   // first message. Each costs gRPC 12 KB (**observed**) and is not counted by any call of the
@@ -52,8 +54,7 @@ struct FrameLimits {
   // Share of each burst, except late_data, that is available when the connection begins.
   double first_share = 1;
   // WINDOW_UPDATE frames. gRPC clients send two for every 16 KiB or more that they read.
-  double window_updates = 50'000;
-  double window_updates_per_second = 50'000;
+  Rate window_updates = {50'000, 50'000};
 };
 
 // Totals of all guards.
@@ -128,7 +129,9 @@ class FrameGuard {
  private:
   // A token bucket.
   struct Bucket {
+    FrameLimits::Rate rate;
     double tokens;
+    void Refill(double seconds);
     bool Take(double count);
   };
   struct HalfOpen {
@@ -167,7 +170,6 @@ class FrameGuard {
   void Close(std::vector<HalfOpen>::iterator stream);
   // Removes a stream from the open and the half-open ones, if it is among them.
   void End(uint32_t stream);
-  void Refill(Clock::time_point now);
 
   const FrameLimits limits_;
   HalfOpenTotals& all_half_open_;
