@@ -32,15 +32,36 @@ class LogFileSystem::File : public rocksdb::FSWritableFileOwnerWrapper {
   File(LogFileSystem& system, std::unique_ptr<rocksdb::FSWritableFile> file)
       : FSWritableFileOwnerWrapper(std::move(file)), system_(system) {}
 
+  IOStatus Append(const rocksdb::Slice& data, const IOOptions& options,
+                  IODebugContext* debug) override {
+    if (is_cut_) return AlreadyCut();
+    return NoteAppended(data, FSWritableFileOwnerWrapper::Append(data, options, debug));
+  }
+  IOStatus Append(const rocksdb::Slice& data, const IOOptions& options,
+                  const rocksdb::DataVerificationInfo& info, IODebugContext* debug) override {
+    if (is_cut_) return AlreadyCut();
+    return NoteAppended(data, FSWritableFileOwnerWrapper::Append(data, options, info, debug));
+  }
   IOStatus Sync(const IOOptions& options, IODebugContext* debug) override {
-    return system_.NoteSync(FSWritableFileOwnerWrapper::Sync(options, debug));
+    return NoteSynced(FSWritableFileOwnerWrapper::Sync(options, debug));
   }
   IOStatus Fsync(const IOOptions& options, IODebugContext* debug) override {
-    return system_.NoteSync(FSWritableFileOwnerWrapper::Fsync(options, debug));
+    return NoteSynced(FSWritableFileOwnerWrapper::Fsync(options, debug));
   }
 
  protected:
+  // Called with the results of operations, which they return.
+  virtual IOStatus NoteAppended(const rocksdb::Slice& /*data*/, const IOStatus& status) {
+    return status;
+  }
+  virtual IOStatus NoteSynced(const IOStatus& status) { return system_.NoteSync(status); }
+
   LogFileSystem& system_;
+  // Refuses appends if true.
+  std::atomic<bool> is_cut_ = false;
+
+ private:
+  static IOStatus AlreadyCut() { return IOStatus::IOError("the log was truncated after an error"); }
 };
 
 class LogFileSystem::Directory : public rocksdb::FSDirectoryWrapper {
@@ -78,42 +99,26 @@ class LogFileSystem::Log : public File {
     if (log != system_.logs_.end() && log->second.open == this) log->second.open = nullptr;
   }
 
-  IOStatus Append(const rocksdb::Slice& data, const IOOptions& options,
-                  IODebugContext* debug) override {
-    if (is_cut_) return AlreadyCut();
-    const IOStatus status = FSWritableFileOwnerWrapper::Append(data, options, debug);
-    return Note(data, status);
-  }
-  IOStatus Append(const rocksdb::Slice& data, const IOOptions& options,
-                  const rocksdb::DataVerificationInfo& info, IODebugContext* debug) override {
-    if (is_cut_) return AlreadyCut();
-    const IOStatus status = FSWritableFileOwnerWrapper::Append(data, options, info, debug);
-    return Note(data, status);
-  }
-
   // Truncates the open file itself, because RocksDB sets the size that it has recorded when it
   // closes the file.
   IOStatus CutTo(uint64_t size) {
     is_cut_ = true;
     IOStatus cut = FSWritableFileOwnerWrapper::Truncate(size, IOOptions(), nullptr);
-    // Calls the base class because this class's Sync fails after a cut.
+    // Calls the base class: this sync does not count, as RocksDB did not request it.
     // NOLINTNEXTLINE(bugprone-parent-virtual-call)
     if (cut.ok()) cut = FSWritableFileOwnerWrapper::Sync(IOOptions(), nullptr);
     return cut;
   }
 
  private:
-  static IOStatus AlreadyCut() { return IOStatus::IOError("the log was truncated after an error"); }
-
   // A failed call may have written any part of the data; none of it will be committed.
-  IOStatus Note(const rocksdb::Slice& data, const IOStatus& status) {
+  IOStatus NoteAppended(const rocksdb::Slice& data, const IOStatus& status) override {
     const std::lock_guard lock(system_.mutex_);
     Extend(system_.logs_[name_].written, data);
     return status;
   }
 
   const std::string name_;
-  std::atomic<bool> is_cut_ = false;
 };
 
 // RocksDB abandons a manifest after a failed write.
@@ -122,31 +127,16 @@ class LogFileSystem::Manifest : public File {
   Manifest(LogFileSystem& system, uint64_t number, std::unique_ptr<rocksdb::FSWritableFile> file)
       : File(system, std::move(file)), number_(number) {}
 
-  IOStatus Append(const rocksdb::Slice& data, const IOOptions& options,
-                  IODebugContext* debug) override {
-    return Note(data, FSWritableFileOwnerWrapper::Append(data, options, debug));
-  }
-  IOStatus Append(const rocksdb::Slice& data, const IOOptions& options,
-                  const rocksdb::DataVerificationInfo& info, IODebugContext* debug) override {
-    return Note(data, FSWritableFileOwnerWrapper::Append(data, options, info, debug));
-  }
-  IOStatus Sync(const IOOptions& options, IODebugContext* debug) override {
-    return NoteSynced(File::Sync(options, debug));
-  }
-  IOStatus Fsync(const IOOptions& options, IODebugContext* debug) override {
-    return NoteSynced(File::Fsync(options, debug));
-  }
-
  private:
-  IOStatus Note(const rocksdb::Slice& data, const IOStatus& status) {
+  IOStatus NoteAppended(const rocksdb::Slice& data, const IOStatus& status) override {
     Extend(written_, data);
     is_whole_ = is_whole_ && status.ok();
     return status;
   }
-  IOStatus NoteSynced(const IOStatus& status) {
+  IOStatus NoteSynced(const IOStatus& status) override {
     is_whole_ = is_whole_ && status.ok();
     if (is_whole_) system_.NoteManifest(number_, written_);
-    return status;
+    return File::NoteSynced(status);
   }
 
   const uint64_t number_;
