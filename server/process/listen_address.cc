@@ -3,18 +3,19 @@
 #include <absl/status/status.h>
 #include <absl/strings/numbers.h>
 #include <absl/strings/str_cat.h>
-#include <arpa/inet.h>
-#include <sys/socket.h>
 #include <sys/un.h>
 
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/address.hpp>
+#include <boost/asio/local/stream_protocol.hpp>
 #include <cerrno>
-#include <cstring>
 
 #include "server/contract/errors.h"
-#include "server/process/descriptors.h"
 
 namespace hulld::server {
 namespace {
+
+namespace asio = boost::asio;
 
 bool IsPort(const std::string& text) {
   uint32_t port = 0;
@@ -30,11 +31,8 @@ absl::Status Malformed(const char* flag, const std::string& text, const char* wh
 }  // namespace
 
 bool ListenAddress::is_local() const {
-  if (is_unix() || host == "localhost") return true;
-  in_addr v4;
-  if (inet_pton(AF_INET, host.c_str(), &v4) == 1) return (ntohl(v4.s_addr) >> 24) == 127;
-  in6_addr v6;
-  return inet_pton(AF_INET6, host.c_str(), &v6) == 1 && IN6_IS_ADDR_LOOPBACK(&v6);
+  boost::system::error_code error;
+  return is_unix() || host == "localhost" || asio::ip::make_address(host, error).is_loopback();
 }
 
 std::string ListenAddress::Format(int bound_port) const {
@@ -79,13 +77,11 @@ absl::Status CheckExposure(const ListenAddress& address, bool has_tls, bool inse
 
 absl::Status CheckSocketFree(const ListenAddress& address) {
   if (!address.is_unix()) return absl::OkStatus();
-  const Descriptor socket(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
-  sockaddr_un name = {};
-  name.sun_family = AF_UNIX;
-  std::memcpy(name.sun_path, address.path.c_str(), address.path.size() + 1);
-  if (connect(socket.number(), reinterpret_cast<const sockaddr*>(&name), sizeof name) != 0) {
-    return absl::OkStatus();
-  }
+  asio::io_context context;
+  asio::local::stream_protocol::socket socket(context);
+  boost::system::error_code error;
+  socket.connect(address.path, error);
+  if (error) return absl::OkStatus();
   return Unavailable("cannot listen on unix:", address.path,
                      ": another server is listening; stop it or choose another path with --listen");
 }
