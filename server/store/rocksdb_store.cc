@@ -286,12 +286,8 @@ absl::Status RocksDbStore::Probe() {
   const std::string path = scratch + "/probe";
   // The next call reports a failure.
   env_->CreateDirIfMissing(scratch).PermitUncheckedError();
-  std::unique_ptr<rocksdb::WritableFile> file;
-  rocksdb::Status status = env_->NewWritableFile(path, &file, rocksdb::EnvOptions());
-  if (status.ok()) status = file->Append(std::string(size_t{64} << 10, '\0'));
-  if (status.ok()) status = file->Sync();
-  if (status.ok()) status = file->Close();
-  file = nullptr;
+  const rocksdb::Status status = rocksdb::WriteStringToFile(
+      env_.get(), std::string(size_t{64} << 10, '\0'), path, /*should_sync=*/true);
   env_->DeleteFile(path).PermitUncheckedError();
   return status.ok() ? absl::OkStatus() : WriteFailed(status);
 }

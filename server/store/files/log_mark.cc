@@ -156,17 +156,12 @@ absl::StatusOr<std::optional<uint64_t>> ReadCurrent(rocksdb::FileSystem& files,
   const std::string path = CurrentPath(directory);
   const IOStatus exists = files.FileExists(path, IOOptions(), nullptr);
   if (exists.IsNotFound()) return absl::NotFoundError(path);
-  std::unique_ptr<rocksdb::FSSequentialFile> file;
-  IOStatus status = files.NewSequentialFile(path, FileOptions(), &file, nullptr);
-  char scratch[64];
-  rocksdb::Slice read;
-  if (status.ok()) {
-    status = file->Read(sizeof scratch, IOOptions(), &read, scratch, nullptr);
-  }
-  if (!status.ok()) return CannotRead(path, status);
-  if (!read.ends_with("\n")) return std::nullopt;
-  read.remove_suffix(1);
-  return ManifestNumber(read.ToString());
+  std::string content;
+  const IOStatus read = rocksdb::ReadFileToString(&files, path, &content);
+  if (!read.ok()) return CannotRead(path, read);
+  if (!content.ends_with('\n')) return std::nullopt;
+  content.pop_back();
+  return ManifestNumber(content);
 }
 
 absl::StatusOr<std::string> FindLostManifest(rocksdb::FileSystem& files,
@@ -209,21 +204,18 @@ absl::StatusOr<std::optional<LogMark>> ReadLogMark(rocksdb::FileSystem& files,
                                                    const std::string& path) {
   const IOStatus exists = files.FileExists(path, IOOptions(), nullptr);
   if (exists.IsNotFound()) return std::nullopt;
-  std::unique_ptr<rocksdb::FSRandomAccessFile> file;
-  IOStatus status = files.NewRandomAccessFile(path, FileOptions(), &file, nullptr);
+  std::string content;
+  const IOStatus read = rocksdb::ReadFileToString(&files, path, &content);
+  if (!read.ok()) return CannotRead(path, read);
   std::optional<LogMark> newest;
-  for (uint64_t offset = 0; status.ok() && offset <= kSlotDistance; offset += kSlotDistance) {
+  for (const uint64_t offset : {uint64_t{0}, kSlotDistance}) {
+    if (content.size() < offset + sizeof(Slot)) continue;
     Slot slot;
-    char scratch[sizeof(Slot)];
-    rocksdb::Slice bytes;
-    status = file->Read(offset, sizeof(Slot), IOOptions(), &bytes, scratch, nullptr);
-    if (!status.ok() || bytes.size() != sizeof(Slot)) continue;
-    std::memcpy(slot.data(), bytes.data(), sizeof(Slot));
+    std::memcpy(slot.data(), content.data() + offset, sizeof(Slot));
     std::optional<LogMark> mark = Decode(slot);
     if (!mark.has_value()) continue;
     if (!newest.has_value() || mark->generation > newest->generation) newest = std::move(mark);
   }
-  if (!status.ok()) return CannotRead(path, status);
   if (!newest.has_value()) return absl::DataLossError(absl::StrCat(path, " is damaged"));
   return newest;
 }
@@ -231,13 +223,9 @@ absl::StatusOr<std::optional<LogMark>> ReadLogMark(rocksdb::FileSystem& files,
 // Renamed only after it is complete and on disk.
 IOStatus MakeLogMark(rocksdb::FileSystem& files, const std::string& path, const LogMark& mark) {
   const std::string unfinished = path + ".new";
-  std::unique_ptr<rocksdb::FSWritableFile> file;
-  IOStatus status = files.NewWritableFile(unfinished, FileOptions(), &file, nullptr);
   std::string content(2 * kSlotDistance, '\0');
   content.replace(0, sizeof(Slot), Bytes(Encode(mark)));
-  if (status.ok()) status = file->Append(content, IOOptions(), nullptr);
-  if (status.ok()) status = file->Sync(IOOptions(), nullptr);
-  if (status.ok()) status = file->Close(IOOptions(), nullptr);
+  IOStatus status = rocksdb::WriteStringToFile(&files, content, unfinished, /*should_sync=*/true);
   if (status.ok()) status = files.RenameFile(unfinished, path, IOOptions(), nullptr);
   return status.ok() ? SyncDirectory(files, std::filesystem::path(path).parent_path()) : status;
 }
