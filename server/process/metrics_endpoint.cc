@@ -4,6 +4,7 @@
 #include <absl/strings/str_cat.h>
 #include <prometheus/text_serializer.h>
 
+#include <algorithm>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/read_until.hpp>
@@ -11,6 +12,7 @@
 #include <boost/asio/write.hpp>
 #include <boost/beast/core/tcp_stream.hpp>
 #include <boost/beast/http/empty_body.hpp>
+#include <boost/beast/http/field.hpp>
 #include <boost/beast/http/parser.hpp>
 #include <boost/beast/http/status.hpp>
 #include <boost/beast/http/verb.hpp>
@@ -85,21 +87,28 @@ class Connection : public std::enable_shared_from_this<Connection> {
     if (place_.has_value()) open_.splice(open_.end(), open_, *place_);
   }
 
-  // Answers the first `size` bytes of input. Malformed requests and those with a body get no
-  // answer.
+  // Answers the request whose header is the first `size` bytes of input. A body is not read: it
+  // ends the connection.
   void Answer(size_t size) {
     http::request_parser<http::empty_body> parser;
-    parser.body_limit(0);
+    parser.skip(true);
     error_code error;
     parser.put(asio::buffer(input_.data(), size), error);
-    if (error) return;
     input_.erase(0, size);
     const auto& request = parser.get();
     const bool is_head = request.method() == http::verb::head;
-    const beast::string_view path = request.target().substr(0, request.target().find('?'));
+    beast::string_view path = request.target().substr(0, request.target().find('?'));
+    // Proxies may name the whole URL.
+    constexpr beast::string_view kScheme = "http://";
+    if (path.starts_with(kScheme)) {
+      path.remove_prefix(std::min(path.find('/', kScheme.size()), path.size()));
+    }
     http::status status = http::status::ok;
     std::string body;
-    if (!is_head && request.method() != http::verb::get) {
+    if (error) {
+      status = http::status::bad_request;
+      body = absl::StrCat("Malformed HTTP request: ", error.message(), ".\n");
+    } else if (!is_head && request.method() != http::verb::get) {
       status = http::status::method_not_allowed;
       body = "Only GET is served.\n";
     } else if (path != "/metrics") {
@@ -108,7 +117,9 @@ class Connection : public std::enable_shared_from_this<Connection> {
     } else {
       body = prometheus::TextSerializer().Serialize(metrics_.Collect());
     }
-    const bool keep_alive = request.keep_alive();
+    const bool has_body = request.chunked() || (request.has_content_length() &&
+                                                request[http::field::content_length] != "0");
+    const bool keep_alive = !error && !has_body && request.keep_alive();
     const beast::string_view reason = http::obsolete_reason(status);
     reply_ = absl::StrCat(
         "HTTP/1.1 ", static_cast<unsigned>(status), " ",

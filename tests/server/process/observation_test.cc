@@ -126,10 +126,22 @@ TEST_F(Observation, TheMetricsEndpointServesNothingElse) {
   const std::string head = reply("HEAD /metrics HTTP/1.1\r\nHost: h" + end);
   EXPECT_THAT(head, StartsWith("HTTP/1.1 200"));
   EXPECT_TRUE(head.ends_with("\r\n\r\n"));
-  // A body, an unterminated header, and malformed HTTP.
-  EXPECT_EQ(reply("GET /metrics HTTP/1.1\r\nContent-Length: 9\r\n\r\n123456789"), "");
+  EXPECT_THAT(reply("GET http://host:9090/metrics HTTP/1.1\r\nHost: h" + end),
+              StartsWith("HTTP/1.1 200"));
+  EXPECT_THAT(reply("GET http://host HTTP/1.1\r\nHost: h" + end), StartsWith("HTTP/1.1 404"));
+  // A body ends the connection, so it is never taken for a request.
+  const std::string body = "GET /metrics HTTP/1.1\r\n\r\n";
+  const std::string with_body =
+      reply("POST /metrics HTTP/1.1\r\nContent-Length: " + std::to_string(body.size()) +
+            "\r\n\r\n" + body);
+  EXPECT_THAT(with_body, StartsWith("HTTP/1.1 405"));
+  EXPECT_THAT(with_body, Not(HasSubstr("200 OK")));
+  EXPECT_THAT(
+      reply("POST /metrics HTTP/1.1\r\nTransfer-Encoding: chunked\r\n\r\n1\r\nx\r\n0\r\n\r\n"),
+      StartsWith("HTTP/1.1 405"));
+  // Malformed HTTP, and an unterminated header.
   EXPECT_EQ(reply("GET /metrics HTTP/1.1\r\nX: " + std::string(9000, 'x')), "");
-  EXPECT_EQ(reply("\x16\x03\x01 hello\r\n\r\n"), "");
+  EXPECT_THAT(reply("\x16\x03\x01 hello\r\n\r\n"), StartsWith("HTTP/1.1 400"));
   // Two requests of one connection.
   const std::string two =
       reply("GET /metrics HTTP/1.1\r\nHost: h\r\n\r\nGET /none HTTP/1.1\r\nHost: h" + end);
