@@ -35,6 +35,11 @@ done
 hullctl generate sphere 10000 2>errors | head -n 1 >/dev/null || [[ ${PIPESTATUS[0]} == 141 ]]
 [[ ! -s errors ]] || { echo "a closed pipe: $(cat errors)"; exit 1; }
 
+# Below some twenty descriptors, gRPC would abort.
+code=0
+(ulimit -n 16 && exec hulld --data-dir few --listen unix:few-socket) 2>errors || code=$?
+[[ $code == 1 ]] && grep -q "limit on open files is 16" errors || { echo "16 descriptors: $code, $(cat errors)"; exit 1; }
+
 ln -s missing dangling
 ! hulld --check-config --data-dir dangling >/dev/null || { echo "a dangling link was accepted"; exit 1; }
 
