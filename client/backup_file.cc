@@ -78,7 +78,8 @@ absl::StatusOr<v1::SaveBackupResponse> ReadPart(std::istream& file) {
 }
 
 absl::Status CannotWrite(const fs::path& path) {
-  return absl::UnavailableError(absl::StrCat("cannot write ", path.string()));
+  return absl::UnavailableError(
+      absl::StrCat("cannot write ", path.string(), ": ", strerror(errno)));
 }
 
 // Writes the files below `directory`.
@@ -267,7 +268,7 @@ absl::Status BackupWriter::Write(const v1::SaveBackupResponse& part) {
   file_ << head << bytes;
   if (file_) return absl::OkStatus();
   return absl::InvalidArgumentError(
-      absl::StrCat("cannot write ", partial_path_, "; is the disk full?"));
+      absl::StrCat("cannot write ", partial_path_, ": ", strerror(errno)));
 }
 
 absl::Status BackupWriter::Finish() {
@@ -275,7 +276,8 @@ absl::Status BackupWriter::Finish() {
   file_.close();
   std::error_code error;
   if (!file_ || !SyncPath(partial_path_)) {
-    return absl::InvalidArgumentError(absl::StrCat("cannot write ", partial_path_));
+    return absl::InvalidArgumentError(
+        absl::StrCat("cannot write ", partial_path_, ": ", strerror(errno)));
   }
   fs::rename(partial_path_, path_, error);
   if (error) return absl::InvalidArgumentError(absl::StrCat(path_, ": ", error.message()));
