@@ -8,8 +8,10 @@
 #include <fstream>
 #include <limits>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <random>
+#include <semaphore>
 #include <thread>
 
 #include "core/hull/audit.h"
@@ -452,23 +454,23 @@ TEST_F(StoreFault, NoAckPrecedesItsSync) {
       ASSERT_TRUE(opened.ok());
       std::mt19937_64 random(kSeed + w);
       std::uniform_real_distribution<double> coordinate(-1, 1);
-      std::atomic<int> in_flight = 0;
+      // Several chunks are in flight, so that batches and chains of changes are cut.
+      constexpr int kInFlight = 8;
+      const auto slots = std::make_shared<std::counting_semaphore<kInFlight>>(kInFlight);
       for (uint64_t sequence = 1; !ending; ++sequence) {
         std::vector<Vector> points;
         for (uint64_t i = random() % 60; i > 0; --i) {
           points.emplace_back(coordinate(random), coordinate(random), coordinate(random));
         }
-        // Several chunks are in flight, so that batches and chains of changes are cut.
-        while (in_flight >= 8) std::this_thread::yield();
-        ++in_flight;
-        hulls_->registry().changes().Append(opened->session,
-                                            {sequence, std::move(points), std::nullopt}, {}, {},
-                                            [&, id, sequence](absl::StatusOr<ChunkResult> result) {
-                                              if (result.ok()) acks.Note(id, sequence, *result);
-                                              --in_flight;
-                                            });
+        slots->acquire();
+        hulls_->registry().changes().Append(
+            opened->session, {sequence, std::move(points), std::nullopt}, {}, {},
+            [&, slots, id, sequence](absl::StatusOr<ChunkResult> result) {
+              if (result.ok()) acks.Note(id, sequence, *result);
+              slots->release();
+            });
       }
-      while (in_flight > 0) std::this_thread::yield();
+      for (int i = 0; i < kInFlight; ++i) slots->acquire();
     });
   }
   std::mt19937_64 random(kSeed);
