@@ -26,7 +26,7 @@ install(CODE [[
 
 foreach(package server:hulld hullctl:hullctl devel:libhulld-dev python:python3-hulld)
   string(REGEX MATCH "(.*):(.*)" package ${package})
-  install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/${CMAKE_MATCH_2} RENAME copyright
+  install(FILES docker/debian/copyright DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/${CMAKE_MATCH_2}
           COMPONENT ${CMAKE_MATCH_1} EXCLUDE_FROM_ALL)
 endforeach()
 
@@ -44,11 +44,12 @@ set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
 set(CPACK_DEBIAN_COMPRESSION_TYPE zstd)
 
+# CPack indents the descriptions.
 set(CPACK_DEBIAN_SERVER_PACKAGE_NAME hulld)
 set(CPACK_DEBIAN_SERVER_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_SERVER_DESCRIPTION "server for convex hulls and exact collision queries
- Keeps 3D convex hulls registered by ID, builds them as points stream in, and
- answers separating-axis collision queries over gRPC, exactly on request.")
+Keeps 3D convex hulls registered by ID, builds them as points stream in, and
+answers separating-axis collision queries over gRPC, exactly on request.")
 set(CPACK_DEBIAN_SERVER_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_SERVER_PACKAGE_DEPENDS adduser)
 set(CPACK_DEBIAN_SERVER_PACKAGE_SUGGESTS "hullctl, postgresql, haproxy")
@@ -59,16 +60,16 @@ set(CPACK_DEBIAN_SERVER_PACKAGE_CONTROL_EXTRA
 set(CPACK_DEBIAN_HULLCTL_PACKAGE_NAME hullctl)
 set(CPACK_DEBIAN_HULLCTL_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_HULLCTL_DESCRIPTION "command line of hulld
- Reads points, meshes, scenes, and robots, asks a hulld server about collisions,
- verifies the certificates of its answers, and shows scenes in a browser.")
+Reads points, meshes, scenes, and robots, asks a hulld server about collisions,
+verifies the certificates of its answers, and shows scenes in a browser.")
 set(CPACK_DEBIAN_HULLCTL_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_HULLCTL_PACKAGE_SUGGESTS hulld)
 
 set(CPACK_DEBIAN_DEVEL_PACKAGE_NAME libhulld-dev)
 set(CPACK_DEBIAN_DEVEL_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEVEL_DESCRIPTION "C++ libraries of hulld
- hulld::core computes hulls and collision queries in process; hulld::client talks
- to a server; hulld::verify checks the certificates of its answers.")
+hulld::core computes hulls and collision queries in process; hulld::client talks
+to a server; hulld::verify checks the certificates of its answers.")
 set(CPACK_DEBIAN_DEVEL_PACKAGE_DEPENDS
     "libabsl-dev, libboost-dev, libeigen3-dev, libgrpc++-dev, libprotobuf-dev, pkg-config, protobuf-compiler-grpc, zlib1g-dev")
 
@@ -76,8 +77,8 @@ set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-hulld)
 set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
 set(CPACK_DEBIAN_PYTHON_PACKAGE_ARCHITECTURE all)
 set(CPACK_DEBIAN_PYTHON_DESCRIPTION "Python client of hulld
- Registers hulls from NumPy arrays, asks a hulld server about collisions, and
- verifies the certificates of its answers.")
+Registers hulls from NumPy arrays, asks a hulld server about collisions, and
+verifies the certificates of its answers.")
 set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS "python3 (>= 3.11), python3-grpcio, python3-numpy, python3-protobuf")
 set(CPACK_DEBIAN_PYTHON_PACKAGE_SUGGESTS hulld)
 set(maintainer_scripts ${PROJECT_SOURCE_DIR}/docker/debian/python3-hulld)

@@ -51,6 +51,16 @@ install_packages g++ cmake ninja-build
 echo "== install"
 install_packages $(cd "$root" && printf '/%s ' packages/*.deb)
 
+echo "== descriptions and licenses"
+! within dpkg-query -W -f '${Package}\n${Description}\n' hulld hullctl libhulld-dev python3-hulld |
+  grep '^  ' || { echo "these lines are indented twice"; exit 1; }
+grep -q 'three.js authors' "$root/usr/share/doc/hullctl/copyright"
+echo "== an upgrade keeps the mode of /etc/hulld"
+within chmod 700 /etc/hulld
+within dpkg -i "/$(cd "$root" && echo packages/hulld_*.deb)" >/dev/null
+[[ $(within stat -c %a /etc/hulld) == 700 ]]
+within chmod 750 /etc/hulld
+
 echo "== the service's own command line, as its user"
 unit=$root/lib/systemd/system/hulld.service
 program=$(sed -n 's/^ExecStart=//p' "$unit")
@@ -95,8 +105,10 @@ SESSION
 within bash /session.sh "$program"
 
 echo "== purge"
+within sh -c 'touch /etc/hulld/tokens && chgrp hulld /etc/hulld/tokens'
 within apt-get -q purge -y hulld hullctl libhulld-dev python3-hulld >/dev/null
-rm -rf "$root"/{packages,consumer,session.sh,apt.log} "$root"/tmp/*
+[[ -z $(within find /etc -nogroup) ]]
+rm -rf "$root"/{etc/hulld,packages,consumer,session.sh,apt.log} "$root"/tmp/*
 left=$(cd "$root" && find . -xdev \( -name proc -o -name dev \) -prune -o \
   \( -iname '*hulld*' -o -iname '*hullctl*' \) -print; grep -s hulld "$root"/etc/passwd "$root"/etc/group || true)
 if [[ -n $left ]]; then
