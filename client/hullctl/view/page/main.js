@@ -105,6 +105,10 @@ class Viewer {
       this.stage.draw(!rest);
       this.ask(rest);
     });
+    $('canvas').addEventListener(
+        'webglcontextlost',
+        () => this.say(
+            'The browser has stopped drawing. If the picture does not return, reload the page.'));
     model.on('visibility shown', () => this.rebuildGround());
     model.on('visibility', () => {
       this.objectPanel.rebuild();
@@ -330,13 +334,14 @@ class Viewer {
     });
   }
 
-  // Called when all shapes have arrived: centers the origin, and selects a pair in a small scene.
+  // Called when all shapes have arrived: sets the origin and the unit, and selects a pair in a
+  // small scene.
   firstFit() {
     const {model} = this;
     const bounds = model.bounds();
     if (!bounds) return;
     this.fitted = true;
-    model.origin = bounds.center.slice();
+    model.drawAround(bounds);
     this.stage.radius = bounds.radius;
     this.stage.flyTo(bounds, {jump: true, direction: this.stage.defaultView()});
     this.stage.isFitted = true;

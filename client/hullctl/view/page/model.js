@@ -70,8 +70,10 @@ export class Model extends EventTarget {
     this.motion = null;
     // {index, pose}: poses before each completed drag.
     this.history = [];
-    // In double; drawn coordinates are relative to it.
+    // Drawn coordinates are relative to the origin and in this unit, a power of two near the size
+    // of the scene: the GPU's floats would overflow or underflow in the unit of the points.
     this.origin = [0, 0, 0];
+    this.unit = 1;
   }
 
   tell(type, detail) {
@@ -269,6 +271,17 @@ export class Model extends EventTarget {
     return PATH_TIMES.map((t) => poseAt(start, endPose, t));
   }
 
+  // Sets the origin and the unit of drawn coordinates.
+  drawAround({center, radius}) {
+    this.origin = center.slice();
+    this.unit = 2 ** Math.min(1023, Math.floor(Math.log2(radius)));
+  }
+
+  // Returns the difference of two points in the unit of drawn coordinates.
+  drawn(p, base = this.origin) {
+    return difference(p, base).map((value) => value / this.unit);
+  }
+
   // Returns {center, radius, corners}: a sphere around all shown objects and their motions, and its
   // input points; null if none is shown. `now`: without the motions.
   bounds(objects = this.objects, now = false) {
@@ -278,7 +291,8 @@ export class Model extends EventTarget {
             .flatMap((object) => posesOf(object).flatMap((pose) => this.cornersOf(object, pose)));
     if (!corners.length) return null;
     const {low, high, center} = boxOf(corners.flat());
-    return {center, radius: Math.hypot(...difference(high, low)) / 2 || 1, corners};
+    const radius = Math.hypot(...difference(high, center));
+    return {center, radius: Math.min(radius, Number.MAX_VALUE) || 1, corners};
   }
 
   select(index, other = undefined) {

@@ -109,14 +109,18 @@ export class Shape {
     return this.xyz.length / 3;
   }
 
-  // Relative to the center.
-  positions() {
+  vertex(i) {
+    return [this.xyz[3 * i], this.xyz[3 * i + 1], this.xyz[3 * i + 2]];
+  }
+
+  // Relative to the center, in the given unit.
+  positions(unit) {
     const [cx, cy, cz] = this.center;
     const positions = new Float32Array(this.xyz.length);
     for (let i = 0; i < positions.length; i += 3) {
-      positions[i] = this.xyz[i] - cx;
-      positions[i + 1] = this.xyz[i + 1] - cy;
-      positions[i + 2] = this.xyz[i + 2] - cz;
+      positions[i] = (this.xyz[i] - cx) / unit;
+      positions[i + 1] = (this.xyz[i + 1] - cy) / unit;
+      positions[i + 2] = (this.xyz[i + 2] - cz) / unit;
     }
     return positions;
   }

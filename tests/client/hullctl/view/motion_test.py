@@ -133,7 +133,7 @@ class MotionTest(viewer_case.ViewerCase):
           const {array} = surface.attributes.position;
           let highest = [-Infinity, -Infinity, -Infinity];
           for (let i = 0; i < array.length; ++i)
-            highest[i % 3] = Math.max(highest[i % 3], array[i] + base[i % 3]);
+            highest[i % 3] = Math.max(highest[i % 3], array[i] * model.unit + base[i % 3]);
           return Math.max(...[0, 0.5, 1].flatMap((t) => {
             model.setTime(t, true);
             return model.cornersOf(model.objects[1]).flatMap(

@@ -34,6 +34,60 @@ class PictureTest(viewer_case.ViewerCase):
             self.assertEqual(len(shades), 4, theme)
             self.assertGreater(min(b - a for a, b in zip(shades, shades[1:])), 40, (theme, shades))
 
+    def test_scenes_of_any_size_and_place_are_drawn(self):
+        def draw(size, at):
+            cube = {"xyz": [size * v for x in (0, 1) for y in (0, 1) for z in (0, 1)
+                            for v in (x, y, z)]}
+            pathlib.Path(self.hulld.directory, "size.json").write_text(json.dumps(
+                {"placements": [{"points": cube, "pose": {"translation": {"x": x}}}
+                                for x in (at, at + 1.5 * size)]}))
+            self.view("size.json")
+            self.browser.wait(AT_REST)
+            self.browser.js("(hulldViewer.model.show.edges = false, hulldViewer.model.select(null))")
+            black = self.count_pixels("r + g + b < 60", "(counts.get(true) ?? 0) / total")
+            self.assertLess(black, 0.002, (size, at))
+            # A click in the middle of the first cube.
+            self.assertEqual(self.browser.js("""(({model, stage}) => {
+              const [x, y] = stage.toScreen(stage.local(model.centerOf(model.objects[0])));
+              const {left, top} = stage.canvas.getBoundingClientRect();
+              const at = {clientX: left + x, clientY: top + y, pointerId: 1};
+              for (const type of ['pointerdown', 'pointerup'])
+                stage.canvas.dispatchEvent(new PointerEvent(type, at));
+              return model.selected;
+            })(hulldViewer)"""), 0, (size, at))
+            return self.pixels()["drawn"]
+
+        usual = draw(1, 0)
+        self.assertGreater(usual, 0.05)
+        for size in (1e-300, 1e-30, 1e-9, 1e13, 1e30, 1e300):
+            self.assertAlmostEqual(draw(size, 0), usual, delta=0.02, msg=size)
+        # Further apart than neighboring lines of the grid are neighboring doubles.
+        self.assertGreater(draw(1, 1e20), 0.05)
+
+    def test_the_picture_returns_after_the_browser_lost_it(self):
+        self.view("box")
+        self.browser.wait("!hulldViewer.stage.waiting")
+        before = self.pixels()["drawn"]
+        self.browser.js("(globalThis.loss = hulldViewer.stage.renderer.getContext()"
+                        ".getExtension('WEBGL_lose_context')).loseContext()")
+        self.browser.wait("!document.querySelector('#message').hidden")
+        frames = self.browser.js("hulldViewer.stage.frames")
+        self.browser.js("globalThis.loss.restoreContext()")
+        self.browser.wait("hulldViewer.stage.frames > arguments[0]", frames)
+        self.assertAlmostEqual(self.pixels()["drawn"], before, delta=0.01)
+        self.browser.problems()
+
+    def test_a_zoomed_page_draws_at_the_resolution_of_the_screen(self):
+        self.view("box")
+        self.browser.js("(hulldViewer.stage.antialias = true)")
+        for ratio in (2, 1):
+            self.browser.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {
+                "width": 1200 // ratio, "height": 800 // ratio, "deviceScaleFactor": ratio,
+                "mobile": False})
+            self.browser.wait("devicePixelRatio === arguments[0] && (({canvas}) => "
+                              "canvas.width === arguments[0] * canvas.clientWidth)"
+                              "(hulldViewer.stage)", ratio)
+
     def place_boxes(self, name, positions):
         """Writes a scene of boxes, and returns its file name."""
         scene = {"placements": [{"hullId": "box", "pose": {"translation": dict(zip("xyz", p))}}
@@ -75,9 +129,8 @@ class PictureTest(viewer_case.ViewerCase):
         self.assertIsNone(self.browser.js("hulldViewer.model.selected"))
 
     OUTSIDE = """hulldViewer.model.bounds().corners.filter((corner) => {
-      const {stage, model} = hulldViewer;
-      const at = stage.controls.target.clone().set(...corner.map((v, k) => v - model.origin[k]));
-      const seen = stage.toScreen(at);
+      const {stage} = hulldViewer;
+      const seen = stage.toScreen(stage.local(corner));
       return !seen || seen[0] < 0 || seen[1] < 0 || seen[0] > stage.canvas.clientWidth ||
           seen[1] > stage.canvas.clientHeight;
     }).length"""
@@ -108,7 +161,8 @@ class PictureTest(viewer_case.ViewerCase):
           const heightOf = (p) => Number(x) * p[0] + Number(y) * p[1] + Number(z) * p[2];
           const heights = Array.from(
               {length: array.length / 3},
-              (_, i) => heightOf([0, 1, 2].map((k) => array[3 * i + k] + model.origin[k])));
+              (_, i) => heightOf([0, 1, 2].map(
+                  (k) => array[3 * i + k] * model.unit + model.origin[k])));
           const inside = [...array].every(
               (v, i) => v >= low.getComponent(i % 3) - 1e-5 && v <= high.getComponent(i % 3) + 1e-5);
           const [a, b] = model.objects.map((object) => model.cornersOf(object).map(heightOf));
@@ -138,9 +192,8 @@ class PictureTest(viewer_case.ViewerCase):
                     self.assertAlmostEqual(seen, wanted, delta=1e-3)
         # The near and the far side of the box look equally large only in the orthographic view.
         sides = """(() => {
-          const {stage, model} = hulldViewer;
-          const at = (x, y, z) => stage.toScreen(stage.controls.target.clone()
-              .set(x - model.origin[0], y - model.origin[1], z - model.origin[2]))[0];
+          const {stage} = hulldViewer;
+          const at = (x, y, z) => stage.toScreen(stage.local([x, y, z]))[0];
           return (at(1, 0, 1) - at(-1, 0, 1)) / (at(1, 0, -1) - at(-1, 0, -1));
         })()"""
         self.keys("a")
@@ -156,7 +209,7 @@ class PictureTest(viewer_case.ViewerCase):
           const {stage, model} = hulldViewer;
           const bar = document.querySelector('#scale');
           const at = (x) => stage.toScreen(stage.controls.target.clone()
-              .add({x, y: 0, z: 0}))[0];
+              .add({x: x / model.unit, y: 0, z: 0}))[0];
           return [parseFloat(bar.textContent), bar.getBoundingClientRect().width, at(1) - at(0)];
         })()""")
         self.assertAlmostEqual(pixels / units, width, delta=0.02 * width)
@@ -253,7 +306,7 @@ class PictureTest(viewer_case.ViewerCase):
         self.browser.js("(hulldViewer.model.show.labels = false, hulldViewer.model.select(null))")
         x, y = self.browser.js("""(() => {
           const {stage, model} = hulldViewer;
-          const p = [0, 0, 1.5].map((value, k) => value - model.origin[k]);
+          const p = model.drawn([0, 0, 1.5]);
           return stage.toScreen(stage.controls.target.clone().set(...p));
         })()""")
         width, height = self.browser.js(
@@ -313,7 +366,7 @@ class PictureTest(viewer_case.ViewerCase):
         for corner in ((-1, 1, 1), (1, 1, -1)):
             x, y = self.browser.js("""(() => {
               const {stage, model} = hulldViewer;
-              const [x, y, z] = arguments[0].map((value, k) => value - model.origin[k]);
+              const [x, y, z] = model.drawn(arguments[0]);
               // Slightly toward the center of the upper face, for a hit.
               return stage.toScreen(stage.controls.target.clone().set(0.97 * x, y, 0.97 * z));
             })()""", corner)

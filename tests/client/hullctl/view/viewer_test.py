@@ -112,7 +112,8 @@ class ViewerTest(viewer_case.ViewerCase):
         pair = self.browser.wait("document.querySelector('#collisions li button')")
         self.browser.js("arguments[0].click()", pair)
         self.browser.wait(
-            "Math.abs(hulldViewer.stage.controls.target.x + hulldViewer.model.origin[0] - 100.5) < 1e-6")
+            "(({model, stage}) => Math.abs(stage.controls.target.x * model.unit + model.origin[0]"
+            " - 100.5) < 1e-6)(hulldViewer)")
         answer = self.assert_answers_as_api()
         self.assertAlmostEqual(answer["separation"]["value"], -1)
 
@@ -286,7 +287,8 @@ class ViewerTest(viewer_case.ViewerCase):
         # The hull lies within the shell: no vertex is farther out than the error.
         self.assertTrue(self.browser.js("""(() => {
           const {model, shell} = hulldViewer;
-          const position = shell.group.children[1].geometry.attributes.position.array;
+          const position = shell.group.children[1].geometry.attributes.position.array
+              .map((value) => value * model.unit);
           const hull = model.hulls.get(model.objects[0].hullId);
           const reach = (xyz, n, c) => {
             let most = -Infinity;
@@ -343,7 +345,8 @@ class ViewerTest(viewer_case.ViewerCase):
         least, most = self.browser.js("""(() => {
           const {model, shell} = hulldViewer;
           const {xyz, center} = model.hulls.get('many');
-          const at = shell.group.children[0].geometry.attributes.position.array;
+          const at = shell.group.children[0].geometry.attributes.position.array
+              .map((value) => value * model.unit);
           let [least, most] = [Infinity, -Infinity];
           for (let i = 0; i < xyz.length; i += 3) {
             const was = Math.hypot(...[0, 1, 2].map((k) => xyz[i + k] - center[k]));
@@ -438,7 +441,8 @@ class ViewerTest(viewer_case.ViewerCase):
         self.view("far.json")
         # GPU coordinates are near 0, where float is precise.
         positions = self.browser.js(
-            "[...hulldViewer.views.values()].map((view) => view.group.position.toArray())")
+            "[...hulldViewer.views.values()].map((view) => "
+            "view.group.position.toArray().map((x) => x * hulldViewer.model.unit))")
         self.assertEqual(positions, [[-1.25, 0, 0], [1.25, 0, 0]])
         self.assertGreater(self.pixels()["drawn"], 0.03)
         answer = self.assert_answers_as_api()

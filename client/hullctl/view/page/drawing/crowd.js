@@ -74,13 +74,14 @@ export class Crowd extends DrawnGroup {
   write(object) {
     const first = 3 * (this.ranges.get(object.index) ?? NaN);
     if (Number.isNaN(first)) return;
+    const {unit} = this.model;
     const {xyz} = this.model.hullOf(object);
     const quaternion = unitQuaternion(object.pose);
     const shift = this.stage.local(object.pose.slice(4)).toArray();
     const {array} = this.positions;
     for (let i = 0; i < xyz.length; i += 3) {
       const p = rotate(quaternion, [xyz[i], xyz[i + 1], xyz[i + 2]]);
-      for (let k = 0; k < 3; ++k) array[first + i + k] = p[k] + shift[k];
+      for (let k = 0; k < 3; ++k) array[first + i + k] = p[k] / unit + shift[k];
     }
     this.positions.needsUpdate = true;
   }

@@ -89,7 +89,7 @@ export class Gizmo {
     let pose = this.startPose.slice();
     if (this.mode === 'translate') {
       const moved = this.proxy.position.clone().sub(this.startPosition).toArray();
-      for (let k = 0; k < 3; ++k) pose[4 + k] += moved[k];
+      for (let k = 0; k < 3; ++k) pose[4 + k] += moved[k] * model.unit;
     } else {
       const {w, x, y, z} = this.proxy.quaternion;
       const center = model.shapeOf(object).center;

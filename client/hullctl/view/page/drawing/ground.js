@@ -32,6 +32,9 @@ export class Ground extends DrawnGroup {
     const {center, radius, corners} = bounds;
     this.step = roundBelow(radius / 2);
     const reach = REACH * radius;
+    const count = 2 * reach / this.step;
+    // Near the ends of the range of doubles, there are no round coordinates.
+    if (!(count < 100)) return;
     const height = Math.min(...corners.map((corner) => corner[up])) - 0.003 * radius;
     const faint = new THREE.Color(this.stage.theme.ground);
     const strong = new THREE.Color(this.stage.theme.grid);
@@ -44,16 +47,17 @@ export class Ground extends DrawnGroup {
       colors.push(color.r, color.g, color.b);
     };
     for (const [along, across] of [[u, v], [v, u]]) {
+      // Far from the origin, beyond 2^53 steps, several lines may have the same coordinate.
       const first = Math.ceil((center[across] - reach) / this.step);
-      const last = Math.floor((center[across] + reach) / this.step);
-      for (let line = first; line <= last; ++line) {
-        const offset = (line * this.step - center[across]) / reach;
+      for (let i = 0; i <= count; ++i) {
+        const place = (first + i) * this.step;
+        const offset = (place - center[across]) / reach;
         const half = reach * Math.sqrt(Math.max(0, 1 - offset ** 2));
         for (let piece = 0; piece < PIECES; ++piece) {
           for (const end of [piece, piece + 1]) {
             const at = [];
             at[up] = height;
-            at[across] = line * this.step;
+            at[across] = place;
             at[along] = center[along] + half * (2 * end / PIECES - 1);
             add(at);
           }

@@ -47,7 +47,7 @@ export class Marks extends DrawnGroup {
     const {answer, pair} = this.model;
     const objects = (pair || []).map((i) => this.model.objects[i]);
     if (answer && !answer.problem && pair && objects.every((o) => this.model.isShown(o))) {
-      this.size = Math.min(...objects.map((o) => this.model.radiusOf(o))) || 1;
+      this.size = Math.min(...objects.map((o) => this.model.radiusOf(o))) / this.model.unit || 1;
       const witness = answer.witness && isFinite(answer.separation?.value) &&
           [number(answer.witness.pointA), number(answer.witness.pointB)];
       if (witness && this.on.witness) this.addWitness(witness);
@@ -153,7 +153,7 @@ export class Marks extends DrawnGroup {
   boxOf(objects) {
     const {corners, radius} = this.model.bounds(objects, true);
     const box = new THREE.Box3().setFromPoints(corners.map((corner) => this.stage.local(corner)));
-    box.expandByScalar(0.05 * radius);
+    box.expandByScalar(0.05 * radius / this.model.unit);
     return [box.min, box.max];
   }
 

@@ -7,16 +7,18 @@ import {MARK_COLORS, RELATIONS} from 'hulld/palette.js';
 
 const FLASH_MS = 1200;
 
-// Objects share shapes and their GPU resources.
+// Objects share shapes and their GPU resources, in a unit of length.
 const geometries = new WeakMap();
-export function geometryOf(shape, kind) {
-  const kinds = geometries.get(shape) || {};
-  geometries.set(shape, kinds);
+export function geometryOf(shape, kind, unit) {
+  let kinds = geometries.get(shape);
+  if (kinds?.unit !== unit) {
+    kinds = {unit, position: new THREE.BufferAttribute(shape.positions(unit), 3)};
+    geometries.set(shape, kinds);
+  }
   if (!kinds[kind]) {
-    kinds.position ??= new THREE.BufferAttribute(shape.positions(), 3);
     const {position} = kinds;
     const geometry = geometryFrom({position}, kind === 'points' ? null : shape[kind]);
-    geometry.boundingSphere = new THREE.Sphere(new THREE.Vector3(), shape.radius || 1e-9);
+    geometry.boundingSphere = new THREE.Sphere(new THREE.Vector3(), shape.radius / unit || 1e-9);
     kinds[kind] = geometry;
   }
   return kinds[kind];
@@ -62,7 +64,7 @@ export class ObjectView extends DrawnGroup {
 
   // Shapes other than the hull have their own centers.
   shift(part, shape) {
-    part.position.set(...shape.center.map((value, k) => value - this.center[k]));
+    part.position.set(...this.model.drawn(shape.center, this.center));
     part.userData.sharesGeometry = true;
     this.group.add(part);
   }
@@ -75,13 +77,13 @@ export class ObjectView extends DrawnGroup {
       transparent: opacity < 1,
       opacity,
     });
-    this.shift(new THREE.Mesh(geometryOf(mesh, 'triangles'), material), mesh);
+    this.shift(new THREE.Mesh(geometryOf(mesh, 'triangles', this.model.unit), material), mesh);
   }
 
   addPoints(shape) {
     const size = shape.vertexCount > 20000 ? 1.5 : 4;
     const material = discMaterial({color: this.pointColor(), size, alphaTest: 0.5});
-    const points = new THREE.Points(geometryOf(shape, 'points'), material);
+    const points = new THREE.Points(geometryOf(shape, 'points', this.model.unit), material);
     points.renderOrder = 2;
     this.shift(points, shape);
   }
@@ -113,7 +115,7 @@ export class ObjectView extends DrawnGroup {
       };
       const material =
           facetMaterial({color: model.colorOf(object), side, ...(isGlass ? glass : {})});
-      const part = new THREE.Mesh(geometryOf(hull, 'triangles'), material);
+      const part = new THREE.Mesh(geometryOf(hull, 'triangles', model.unit), material);
       part.renderOrder = side === THREE.BackSide ? 3 : 4;
       this.shift(part, hull);
     }
@@ -131,7 +133,7 @@ export class ObjectView extends DrawnGroup {
       opacity,
       depthWrite: opacity === 1,
     });
-    const part = new THREE.Mesh(geometryOf(rounded, 'triangles'), material);
+    const part = new THREE.Mesh(geometryOf(rounded, 'triangles', model.unit), material);
     part.renderOrder = 4;
     this.shift(part, rounded);
   }
@@ -143,7 +145,7 @@ export class ObjectView extends DrawnGroup {
       transparent: true,
       opacity: (relation ? 0.8 : this.stage.theme.edgeOpacity) * edgeWeight(hull.edgeCount),
     });
-    const edges = new THREE.LineSegments(geometryOf(hull, 'edges'), material);
+    const edges = new THREE.LineSegments(geometryOf(hull, 'edges', this.model.unit), material);
     edges.layers.set(FINE_LAYER);
     edges.renderOrder = 5;
     this.shift(edges, hull);
@@ -155,8 +157,8 @@ export class ObjectView extends DrawnGroup {
 
   // Highlights new vertices.
   flash(hull, indices) {
-    const position = Float32Array.from(
-        indices.flatMap((v) => hull.center.map((value, k) => hull.xyz[3 * v + k] - value)));
+    const position =
+        Float32Array.from(indices.flatMap((v) => this.model.drawn(hull.vertex(v), hull.center)));
     const material = discMaterial({
       color: MARK_COLORS.flash,
       size: 11,

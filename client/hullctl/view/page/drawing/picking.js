@@ -1,16 +1,20 @@
 // Finds the object under the pointer: the first one on a ray, in double.
 import {THREE} from 'hulld/drawing/three.js';
 import {toWorld} from 'hulld/pose.js';
+import {sum} from 'hulld/vector.js';
 
 // Distance in CSS pixels within which a picked point snaps to a vertex.
 const SNAP = 10;
 
-// Returns the distance along the ray to the nearest triangle; Infinity if it meets none.
-function hitTriangles({xyz, triangles}, ray) {
+// Returns the distance along the ray to the nearest triangle; Infinity if it meets none. `ray`: in
+// drawn coordinates, relative to the center.
+function hitTriangles({xyz, triangles, center}, ray, unit) {
+  const middle = new THREE.Vector3(...center);
   const [a, b, c, point] = Array.from({length: 4}, () => new THREE.Vector3());
   let nearest = Infinity;
   for (let t = 0; t < triangles.length; t += 3) {
-    [a, b, c].forEach((corner, k) => corner.fromArray(xyz, 3 * triangles[t + k]));
+    [a, b, c].forEach(
+        (corner, k) => corner.fromArray(xyz, 3 * triangles[t + k]).sub(middle).divideScalar(unit));
     if (!ray.intersectTriangle(a, b, c, false, point)) continue;
     nearest = Math.min(nearest, point.distanceTo(ray.origin));
   }
@@ -55,17 +59,18 @@ export function pick(model, stage, x, y, {toVertex = false} = {}) {
     if (!model.isShown(object) || !shape || shape.isEmpty) continue;
     stage.place(frame, model.centerOf(object), object.pose);
     const along = frame.position.clone().sub(ray.origin).dot(ray.direction);
-    const sphere = new THREE.Sphere(frame.position, shape.radius);
-    if (!ray.intersectsSphere(sphere) || along - shape.radius > nearest) continue;
+    const radius = shape.radius / model.unit;
+    const sphere = new THREE.Sphere(frame.position, radius);
+    if (!ray.intersectsSphere(sphere) || along - radius > nearest) continue;
     const back = frame.quaternion.clone().conjugate();
-    const center = new THREE.Vector3(...shape.center);
     const local = new THREE.Ray(
-        ray.origin.clone().sub(frame.position).applyQuaternion(back).add(center),
+        ray.origin.clone().sub(frame.position).applyQuaternion(back),
         ray.direction.clone().applyQuaternion(back));
-    const distance = shape.triangles.length ? hitTriangles(shape, local) : along;
+    const distance = shape.triangles.length ? hitTriangles(shape, local, model.unit) : along;
     if (distance >= nearest) continue;
     nearest = distance;
-    picked = {index: object.index, point: local.at(distance, new THREE.Vector3()).toArray()};
+    const hit = local.at(distance, new THREE.Vector3()).multiplyScalar(model.unit).toArray();
+    picked = {index: object.index, point: sum(hit, shape.center)};
   }
   if (picked && toVertex) {
     const reach = stage.camera.position.distanceTo(ray.origin) + nearest;

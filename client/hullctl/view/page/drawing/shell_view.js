@@ -3,7 +3,7 @@
 import {DrawnGroup} from 'hulld/drawing/drawn_group.js';
 import {geometryFrom, THREE} from 'hulld/drawing/three.js';
 import {MARK_COLORS} from 'hulld/palette.js';
-import {unit} from 'hulld/vector.js';
+import {unit as unitVector} from 'hulld/vector.js';
 
 // Shells of larger hulls have as many facets as the hull.
 const MAX_FACETS = 20000;
@@ -38,7 +38,8 @@ export class ShellView extends DrawnGroup {
     if (!object || object.hullId !== hullId) return;
     this.empty();
     this.object = object;
-    const geometry = geometryFrom({position: simpler.positions()}, simpler.triangles);
+    const geometry =
+        geometryFrom({position: simpler.positions(this.model.unit)}, simpler.triangles);
     this.add(geometry, simpler.center, {color: MARK_COLORS.witness, opacity: 0.35});
     const inner = side === 'inside' ? simpler : this.model.hullOf(object);
     this.addShell(inner, simpler.error);
@@ -58,7 +59,9 @@ export class ShellView extends DrawnGroup {
   addShell(hull, distance) {
     if (!(distance > 0)) return;
     const make = hull.facetCount > MAX_FACETS ? fineShell : shellGeometry;
-    this.add(make(hull, distance), hull.center, {color: MARK_COLORS.shell, opacity: 0.2});
+    this.add(
+        make(hull, distance, this.model.unit), hull.center,
+        {color: MARK_COLORS.shell, opacity: 0.2});
   }
 
   add(geometry, center, {color, opacity}) {
@@ -81,16 +84,16 @@ export class ShellView extends DrawnGroup {
     const base = this.model.hullOf(this.object).center;
     this.stage.place(this.group, this.model.centerOf(this.object), this.object.pose);
     for (const part of this.group.children) {
-      part.position.set(...part.userData.center.map((value, k) => value - base[k]));
+      part.position.set(...this.model.drawn(part.userData.center, base));
     }
     this.stage.draw();
   }
 }
 
-// Returns a shell at a given distance around a hull: its facets moved outward, with flat strips in
-// place of the round parts over edges and vertices. The points within the distance of the hull form
-// the round shell; this one approximates it from inside.
-function shellGeometry(hull, distance) {
+// Returns a shell at a given distance around a hull, in drawn coordinates: its facets moved
+// outward, with flat strips in place of the round parts over edges and vertices. The points within
+// the distance of the hull form the round shell; this one approximates it from inside.
+function shellGeometry(hull, distance, unit) {
   const sizes = hull.facets.subarray(0, hull.facetCount);
   const corners = hull.facets.subarray(hull.facetCount);
   const [cx, cy, cz] = hull.center;
@@ -108,8 +111,9 @@ function shellGeometry(hull, distance) {
     const base = positions.length / 3;
     facet.forEach((v, i) => {
       positions.push(
-          hull.xyz[3 * v] - cx + distance * n[0], hull.xyz[3 * v + 1] - cy + distance * n[1],
-          hull.xyz[3 * v + 2] - cz + distance * n[2]);
+          (hull.xyz[3 * v] - cx + distance * n[0]) / unit,
+          (hull.xyz[3 * v + 1] - cy + distance * n[1]) / unit,
+          (hull.xyz[3 * v + 2] - cz + distance * n[2]) / unit);
       const j = (i + 1) % facet.length;
       moved.set(`${v} ${facet[j]}`, [base + i, base + j]);
       const previous = facet[(i + facet.length - 1) % facet.length];
@@ -131,7 +135,7 @@ function shellGeometry(hull, distance) {
 // out by the distance along a mean of the normals around it. The hull is extreme at the vertex in
 // that direction, so the moved vertex is exactly at the distance from the hull, and the hull of
 // such points lies inside the round shell.
-function fineShell(hull, distance) {
+function fineShell(hull, distance, unit) {
   const {xyz, triangles} = hull;
   const normals = new Float64Array(xyz.length);
   for (let t = 0; t < triangles.length; t += 3) {
@@ -149,7 +153,7 @@ function fineShell(hull, distance) {
   for (let i = 0; i < xyz.length; i += 3) {
     const scale = distance / (Math.hypot(normals[i], normals[i + 1], normals[i + 2]) || 1);
     for (let k = 0; k < 3; ++k) {
-      position[i + k] = xyz[i + k] - hull.center[k] + scale * normals[i + k];
+      position[i + k] = (xyz[i + k] - hull.center[k] + scale * normals[i + k]) / unit;
     }
   }
   return geometryFrom({position}, triangles);
@@ -178,5 +182,5 @@ function normalOf(xyz, facet) {
       n[k] += (xyz[3 * v + p] - xyz[3 * w + p]) * (xyz[3 * v + q] + xyz[3 * w + q]);
     }
   });
-  return unit(n);
+  return unitVector(n);
 }

@@ -1,5 +1,5 @@
 // The picture: renderer, camera, lights, and orbiting. Draws only after changes. Coordinates are
-// relative to model.origin.
+// drawn ones (model.js).
 import {THREE} from 'hulld/drawing/three.js';
 import {AXIS_COLORS, THEMES} from 'hulld/palette.js';
 import {unitQuaternion} from 'hulld/pose.js';
@@ -28,10 +28,9 @@ export class Stage {
     this.canvas = canvas;
     // In software, antialiasing makes each frame of a motion more than twice as slow; pictures at
     // rest are drawn at a higher resolution instead.
-    const antialias = !isSoftware() || document.body.classList.contains('picture');
-    this.renderer = new THREE.WebGLRenderer({canvas, antialias, preserveDrawingBuffer: true});
-    this.pixelRatio = antialias ? Math.min(devicePixelRatio, 2) : 2;
-    this.renderer.setPixelRatio(this.pixelRatio);
+    this.antialias = !isSoftware() || document.body.classList.contains('picture');
+    this.renderer =
+        new THREE.WebGLRenderer({canvas, antialias: this.antialias, preserveDrawingBuffer: true});
     this.isCoarse = false;
     this.slowFrames = 0;
     this.scene = new THREE.Scene();
@@ -53,6 +52,7 @@ export class Stage {
     this.before = [];
     this.after = [];
     new ResizeObserver(() => this.resize()).observe(canvas);
+    canvas.addEventListener('webglcontextrestored', () => this.draw());
     this.setUp('y');
     this.resize();
   }
@@ -93,6 +93,12 @@ export class Stage {
     this.sky.position.copy(this.camera.up);
   }
 
+  // Pixels of the picture per CSS pixel; changes when the user zooms the page.
+  get pixelRatio() {
+    if (this.isCoarse) return 0.5;
+    return this.antialias ? Math.min(devicePixelRatio, 2) : 2;
+  }
+
   setTheme(name) {
     this.theme = THEMES[name];
     this.renderer.setClearColor(this.theme.ground);
@@ -104,15 +110,16 @@ export class Stage {
   resize() {
     const {clientWidth, clientHeight} = this.canvas;
     if (!clientWidth || !clientHeight) return;
+    this.renderer.setPixelRatio(this.pixelRatio);
     this.renderer.setSize(clientWidth, clientHeight, false);
     this.camera.aspect = clientWidth / clientHeight;
     this.draw();
   }
 
-  // Returns a world point relative to model.origin: subtracts in double, before the GPU's floats
-  // would lose the difference.
+  // Returns a world point in drawn coordinates: subtracts in double, before the GPU's floats would
+  // lose the difference.
   local(p) {
-    return new THREE.Vector3(...p.map((value, k) => value - this.model.origin[k]));
+    return new THREE.Vector3(...this.model.drawn(p));
   }
 
   // Moves a part to a world point, with the rotation of a pose.
@@ -158,7 +165,7 @@ export class Stage {
     if (on === this.isCoarse) return;
     this.isCoarse = on;
     this.camera.layers[on ? 'disable' : 'enable'](FINE_LAYER);
-    this.renderer.setPixelRatio(on ? 0.5 : this.pixelRatio);
+    this.renderer.setPixelRatio(this.pixelRatio);
   }
 
   // Calls `update(now)` before each frame; frames continue while one returns true.
@@ -186,20 +193,21 @@ export class Stage {
     return this.camera.position.distanceTo(this.controls.target);
   }
 
-  // Returns half of the height of the picture at the target, in the caller's length unit.
+  // Returns half of the height of the picture at the target.
   get halfHeight() {
     return this.distance * Math.tan(this.camera.fov * Math.PI / 360);
   }
 
+  // In the caller's length unit.
   lengthPerPixel() {
-    return 2 * this.halfHeight / this.canvas.clientHeight;
+    return 2 * this.halfHeight / this.canvas.clientHeight * this.model.unit;
   }
 
   // Fits the near and far planes to the scene, for full depth precision. The orthographic view has
   // the scale of the perspective one at the target.
   project() {
     const {camera, distance} = this;
-    const reach = 4 * this.radius + this.controls.target.length();
+    const reach = 4 * this.radius / this.model.unit + this.controls.target.length();
     camera.near = Math.max((distance - reach) / 2, distance / 500, reach / 1e5);
     camera.far = distance + 2 * reach;
     camera.updateProjectionMatrix();
@@ -236,9 +244,9 @@ export class Stage {
     // Distance at which each corner is within the picture, with a margin for handles and labels.
     const height = 0.84 * Math.tan(this.camera.fov * Math.PI / 360);
     const width = height * this.camera.aspect;
-    let distance = 0.05 * radius;
+    let distance = 0.05 * radius / this.model.unit;
     for (const corner of corners) {
-      const p = new THREE.Vector3(...corner.map((value, k) => value - center[k]));
+      const p = this.local(corner).sub(target);
       const depth = this.isOrthographic ? 0 : p.dot(view);
       distance = Math.max(
           distance, depth + Math.abs(p.dot(up)) / height, depth + Math.abs(p.dot(right)) / width);

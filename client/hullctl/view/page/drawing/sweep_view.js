@@ -40,9 +40,9 @@ function sampledPoses({start, endPose}) {
   return angleBetween(start, endPose) === 0 && poses.length === 3 ? [start, endPose] : poses;
 }
 
-// Returns the triangles' corners of the swept shape, and of the path, relative to `base`.
-function sweep(parts, center, poses, base) {
-  const placed = (pose, p) => toWorld(pose, p).map((value, k) => value - base[k]);
+// Returns the triangles' corners of the swept shape, and of the path, as `drawn` returns them.
+function sweep(parts, center, poses, drawn) {
+  const placed = (pose, p) => drawn(toWorld(pose, p));
   const corners = [];
   for (const vertices of parts) {
     for (let i = 1; i < poses.length; ++i) {
@@ -54,7 +54,7 @@ function sweep(parts, center, poses, base) {
 }
 
 export class SweepView extends DrawnGroup {
-  // The geometry of each object that was drawn: {shape, base, surface, path}.
+  // The geometry of each object that was drawn: {shape, unit, base, surface, path}.
   known = new Map();
 
   rebuild() {
@@ -79,15 +79,17 @@ export class SweepView extends DrawnGroup {
 
   geometryOf(object, shape) {
     const known = this.known.get(object);
-    if (known?.shape === shape) return known;
+    if (known?.shape === shape && known.unit === this.model.unit) return known;
     known?.surface.dispose();
     known?.path.dispose();
+    const {unit} = this.model;
     const base = toWorld(object.start, shape.center);
+    const drawn = (p) => this.model.drawn(p, base);
     const {corners, path} =
-        sweep(this.partsOf(object, shape), shape.center, sampledPoses(object), base);
+        sweep(this.partsOf(object, shape), shape.center, sampledPoses(object), drawn);
     const [surface, line] =
         [corners, path].map((numbers) => geometryFrom({position: new Float32Array(numbers)}));
-    const made = {shape, base, surface, path: line};
+    const made = {shape, unit, base, surface, path: line};
     this.known.set(object, made);
     return made;
   }
@@ -138,7 +140,7 @@ export class SweepView extends DrawnGroup {
         opacity: edgeWeight(8 * hull.edgeCount),
         depthTest: false,
       });
-      const outline = new THREE.LineSegments(geometryOf(hull, 'edges'), material);
+      const outline = new THREE.LineSegments(geometryOf(hull, 'edges', model.unit), material);
       const center = toWorld(pose, hull.center);
       this.stage.place(outline, center, pose);
       this.add(outline, center, 13);
