@@ -3,6 +3,7 @@
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
+#include <chrono>
 #include <utility>
 
 #include "client/base/status_macros.h"
@@ -16,6 +17,7 @@ namespace {
 
 // During a drag, larger scenes are queried only at rest.
 constexpr size_t kMaxObjectsInMotion = 3000;
+constexpr std::chrono::seconds kPauseBetweenAttempts{1};
 // Maximum number of colliding pairs that the page lists and highlights; totals count all.
 constexpr size_t kMaxListedPairs = 5000;
 
@@ -369,12 +371,19 @@ void AnswerFeed::Run(const std::stop_token& stop) {
     Query query;
     {
       std::unique_lock lock(mutex_);
-      changed_.wait(lock, stop, [this] { return is_requested_; });
+      const auto is_requested = [this] { return is_requested_; };
+      if (is_unreachable_) {
+        changed_.wait_for(lock, stop, kPauseBetweenAttempts, is_requested);
+      } else {
+        changed_.wait(lock, stop, is_requested);
+      }
       if (stop.stop_requested()) return;
       query = query_;
+      query.is_repeated = !is_requested_;
       is_requested_ = false;
       query_.motion_is_stale = false;
     }
+    is_unreachable_ = false;
     if (query.pair && !AnswerPair(query)) return;
     if (!AnswerMotion(query)) return;
     if (!query.rest && query.objects.size() > kMaxObjectsInMotion) continue;
@@ -388,7 +397,13 @@ bool AnswerFeed::AnswerPair(const Query& query) {
   const auto answer = query.rest ? RestingAnswer(query) : MovingAnswer(pair, query.certificate);
   if (answer.ok()) return page_->SendText(*answer);
   stream_.reset();
-  return page_->SendText(ProblemOfPair("answer", pair, answer.status()));
+  return SendError(query, answer.status(), ProblemOfPair("answer", pair, answer.status()));
+}
+
+bool AnswerFeed::SendError(const Query& query, const absl::Status& status,
+                           const std::string& message) {
+  is_unreachable_ |= absl::IsUnavailable(status);
+  return query.is_repeated || page_->SendText(message);
 }
 
 absl::StatusOr<std::string> AnswerFeed::RestingAnswer(const Query& query) const {
@@ -472,15 +487,20 @@ bool AnswerFeed::AnswerMotion(const Query& query) {
   const bool is_known = motion == queried_motion_ && !query.motion_is_stale;
   queried_motion_ = std::move(motion);
   if (!request || is_known) return true;
-  return page_->SendText(MotionAnswerJson(pair, client_.CheckCollision(*request)));
+  const auto response = client_.CheckCollision(*request);
+  const std::string message = MotionAnswerJson(pair, response);
+  if (response.ok()) return page_->SendText(message);
+  queried_motion_.clear();
+  return SendError(query, response.status(), message);
 }
 
-bool AnswerFeed::AnswerScene(const Query& query) const {
+bool AnswerFeed::AnswerScene(const Query& query) {
   const auto answer = SceneAnswerJson(client_, query.rules, query.pairs, query.objects,
                                       query.tolerance, query.update);
   if (answer.ok()) return page_->SendText(*answer);
-  return page_->SendText(ProblemMessage(
-      absl::StrCat("Cannot determine the colliding pairs: ", answer.status().message())));
+  return SendError(query, answer.status(),
+                   ProblemMessage(absl::StrCat("Cannot determine the colliding pairs: ",
+                                               answer.status().message())));
 }
 
 }  // namespace hulld

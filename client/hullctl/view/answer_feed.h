@@ -27,7 +27,8 @@ struct ViewedPair {
 };
 
 // Answers the queries of a page on its own thread. Queries that arrive while one is in flight are
-// merged, and the latest poses win, because the pointer moves faster than answers arrive.
+// merged, and the latest poses win, because the pointer moves faster than answers arrive. While the
+// server is unreachable, repeats the last query every second.
 // The destructor waits for the answer in flight. Thread-safe.
 class AnswerFeed {
  public:
@@ -58,11 +59,16 @@ class AnswerFeed {
     bool certificate = false;
     uint64_t update = 0;
     bool rest = true;
+    // True if the page has the error of an earlier attempt.
+    bool is_repeated = false;
     // True if a hull or the scene changed since the last answer about the motion.
     bool motion_is_stale = true;
   };
 
   void Run(const std::stop_token& stop);
+  // Sends the message of an error, or only notes that the server is unreachable if the page has it.
+  // Returns false if the page has closed.
+  bool SendError(const Query& query, const absl::Status& status, const std::string& message);
   // Sends the answer about the pair. Returns false if the page has closed.
   bool AnswerPair(const Query& query);
   absl::StatusOr<std::string> MovingAnswer(const ViewedPair& pair, bool certificate);
@@ -71,7 +77,7 @@ class AnswerFeed {
   absl::StatusOr<std::string> TolerantAnswer(const ViewedPair& pair, double tolerance) const;
   // Sends the first contact of the pair, if it moves, unless the page has it.
   bool AnswerMotion(const Query& query);
-  bool AnswerScene(const Query& query) const;
+  bool AnswerScene(const Query& query);
 
   const Client& client_;
   const std::shared_ptr<PageChannel> page_;
@@ -85,6 +91,8 @@ class AnswerFeed {
   v1::HullVersion streamed_version_b_;
   // The pair and the request of the last query about a motion; empty if there was none.
   std::string queried_motion_;
+  // The last query failed because the server was unreachable.
+  bool is_unreachable_ = false;
 
   std::mutex mutex_;
   std::condition_variable_any changed_;

@@ -7,6 +7,7 @@ import json
 import pathlib
 
 import viewer_case
+import viewing
 from viewer_case import AT_REST
 
 from selenium.webdriver.common.by import By
@@ -238,6 +239,19 @@ class ViewerTest(viewer_case.ViewerCase):
         self.hulld.hullctl("delete", "live/b")
         self.browser.wait("document.querySelector('#tree').textContent.includes('deleted')")
         self.browser.wait("document.querySelector('#collision-count').textContent === 'No pair collides'")
+
+    def test_answers_return_after_a_restart_of_the_server(self):
+        self.hulld = viewing.Hulld(self.programs)
+        self.addCleanup(self.hulld.stop)
+        self.hulld.add_box("a")
+        self.hulld.add_box("b", low=(2.0, 0.0, 0.0))
+        self.view()
+        self.browser.wait(AT_REST)
+        self.hulld.process.stop()
+        self.browser.js("hulldViewer.ask(true)")
+        self.browser.wait("hulldViewer.model.answer.problem")
+        self.hulld.start()
+        self.assert_answers_as_api()
 
     def test_new_vertices_flash(self):
         self.hulld.add_box("flash")

@@ -65,7 +65,12 @@ class Hulld:
     def __init__(self, programs):
         self.programs = pathlib.Path(programs)
         self.directory = tempfile.mkdtemp(prefix="hulld_viewer_")
-        self.process = Process([self.programs / "hulld", "--listen", "127.0.0.1:0", "--data-dir",
+        self.address = "127.0.0.1:0"
+        self.start()
+
+    def start(self):
+        """Starts the server, again at the same address after the first time."""
+        self.process = Process([self.programs / "hulld", "--listen", self.address, "--data-dir",
                                 self.directory + "/data"], self.directory)
         self.address = self.process.wait_for(r"listening on (\S+:\d+)")[1]
 
