@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import copy
 import os
+import pickle
 import re
 import subprocess
 import sys
@@ -35,6 +37,13 @@ def outcome_in_a_child(act: Callable[[], Any]) -> str:
         text = said_by_child.read()
     os.waitpid(child, 0)
     return text
+
+
+def test_a_client_is_neither_copied_nor_sent_to_another_process() -> None:
+    client = hulld.Client("127.0.0.1:1")
+    for act in (pickle.dumps, copy.deepcopy):
+        with pytest.raises(TypeError, match=r"create another one with its address, client\.server"):
+            act(client)
 
 
 def test_an_import_loads_only_the_modules_that_are_used() -> None:

@@ -6,7 +6,7 @@ import os
 import threading
 import weakref
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NoReturn
 
 from hulld.connection import Connection
 from hulld.errors import FailedPreconditionError
@@ -25,6 +25,12 @@ class Channel:
         self._channel: Any = None
         self._closed = False
         self._calls: dict[str, Any] = {}
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError(
+            "a client can neither be copied nor sent to another process; create another one with "
+            "its address, client.server"
+        )
 
     def get(self) -> Any:
         """gRPC's channel. FailedPreconditionError: the channel is closed; or as in
