@@ -1,7 +1,10 @@
 #include "client/hullctl/scene/yaml_reader.h"
 
 #include <absl/strings/ascii.h>
+#include <absl/strings/match.h>
+#include <absl/strings/numbers.h>
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
 #include <absl/strings/str_join.h>
 #include <yaml-cpp/depthguard.h>
 #include <yaml-cpp/eventhandler.h>
@@ -10,6 +13,7 @@
 #include <exception>
 #include <set>
 #include <sstream>
+#include <string_view>
 
 #include "client/base/status_macros.h"
 #include "client/formats/text_number.h"
@@ -57,6 +61,34 @@ std::string TabAdvice(const std::string& text) {
                       " starts with a tab; indent with spaces");
 }
 
+// Returns the UTF-16 code unit whose JSON escape, such as \ud83d, starts the text; 0 if none does.
+uint32_t EscapedUnit(std::string_view text) {
+  uint32_t unit = 0;
+  const bool is_escape = text.size() >= 6 && text.starts_with("\\u") &&
+                         absl::SimpleHexAtoi({text.data() + 2, 4}, &unit);
+  return is_escape ? unit : 0;
+}
+
+// Replaces the JSON escapes of characters beyond U+FFFF, such as \ud83d\ude00, by those of YAML,
+// \U0001F600. All other JSON is YAML.
+std::string WithYamlEscapes(std::string_view json) {
+  std::string yaml;
+  while (!json.empty()) {
+    const uint32_t high = EscapedUnit(json);
+    const uint32_t low = high >> 10 == 0xD800 >> 10 ? EscapedUnit(json.substr(6)) : 0;
+    if (low >> 10 == 0xDC00 >> 10) {
+      absl::StrAppendFormat(&yaml, "\\U%08X", 0x10000 + ((high & 0x3FF) << 10) + (low & 0x3FF));
+      json.remove_prefix(12);
+      continue;
+    }
+    // An escaped backslash starts no escape.
+    const size_t size = json.starts_with("\\\\") ? 2 : 1;
+    yaml.append(json.substr(0, size));
+    json.remove_prefix(size);
+  }
+  return yaml;
+}
+
 }  // namespace
 
 absl::StatusOr<YamlReader> YamlReader::Parse(const std::string& text, const std::string& name) {
@@ -68,16 +100,18 @@ absl::StatusOr<YamlReader> YamlReader::Parse(const std::string& text, const std:
     return absl::InvalidArgumentError(
         absl::StrCat(name, ": is not UTF-8 text; convert it first: iconv -f ISO-8859-1 -t UTF-8"));
   }
+  const bool is_json = absl::StartsWith(absl::StripLeadingAsciiWhitespace(text), "{");
+  const std::string yaml = is_json ? WithYamlEscapes(text) : text;
   // Parses at most two documents: for text such as ",", yaml-cpp 0.7 never stops finding
   // documents.
   YAML::Node root;
   int documents = 0;
   DocumentStart last;
   try {
-    std::istringstream input(text);
+    std::istringstream input(yaml);
     YAML::Parser parser(input);
     while (documents < 2 && parser.HandleNextDocument(last)) ++documents;
-    if (documents == 1) root = YAML::Load(text);
+    if (documents == 1) root = YAML::Load(yaml);
   } catch (const YAML::DeepRecursion& problem) {
     return absl::InvalidArgumentError(
         absl::StrCat(PlaceText(name, problem.mark), ": nested too deeply"));

@@ -185,6 +185,14 @@ TEST(YamlScene, AliasesResolveToTheirAnchors) {
               ElementsAre("a b"));
 }
 
+TEST(YamlScene, EveryEscapeOfJsonIsRead) {
+  EXPECT_THAT(PairsIn(R"( {"hulls": {"h": {"box": [1, 1, 1]}}, "place":
+                           {"\ud83d\ude00\u00e9\/": {"hull": "h"}, "\\ud83d\\ude00": {"hull": "h"}}})"),
+              ElementsAre("\xF0\x9F\x98\x80\xC3\xA9/ \\ud83d\\ude00"));
+  EXPECT_THAT(ErrorOf(R"({"hulls": {"\ud83d": {"box": [1, 1, 1]}}})"),
+              HasSubstr("invalid unicode"));
+}
+
 TEST(YamlScene, ErrorsNameLineColumnAndKey) {
   const std::pair<const char*, const char*> cases[] = {
       {"hulls: {h: {box: [1, 1]}}", "cell.yaml:1:18: box must have 3 numbers, got 2"},
