@@ -10,7 +10,15 @@ from hulld.calls.attempts import Attempts
 from hulld.calls.channel import Channel
 from hulld.calls.freshness import Freshness
 from hulld.calls.requests import Call, Page, as_fresh
-from hulld.calls.transport import cancel_call, close_channel, invoke, open_channel, read, sleep
+from hulld.calls.transport import (
+    cancel_call,
+    close_channel,
+    invoke,
+    open_channel,
+    read,
+    running_loop,
+    sleep,
+)
 from hulld.connection import DEFAULT_SERVER, Connection, Tls
 from hulld.errors import HulldError, read_answer
 from hulld.notebook import Viewer
@@ -49,7 +57,7 @@ class ClientBase:
         self._viewer = Viewer(self._connection)
         self._timeout = arguments.seconds(timeout)
         self._retry = retry
-        self._channel = Channel(self._connection, open_channel)
+        self._channel = Channel(self._connection, open_channel, running_loop)
 
     @property
     def server(self) -> str:

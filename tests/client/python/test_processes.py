@@ -39,6 +39,15 @@ def outcome_in_a_child(act: Callable[[], Any]) -> str:
     return text
 
 
+def test_an_async_client_belongs_to_one_event_loop() -> None:
+    with hulld.LocalServer() as server:
+        client = hulld.AsyncClient(server.address)
+        assert asyncio.run(client.check_health())
+        with pytest.raises(hulld.FailedPreconditionError, match="create one in each asyncio.run"):
+            asyncio.run(client.check_health())
+        asyncio.run(client.close())
+
+
 def test_a_client_is_neither_copied_nor_sent_to_another_process() -> None:
     client = hulld.Client("127.0.0.1:1")
     for act in (pickle.dumps, copy.deepcopy):

@@ -32,6 +32,14 @@ def open_channel(connection: Connection, pem_files: Any) -> Any:
     return grpc.aio.secure_channel(connection.target, credentials, connection.options())
 
 
+def running_loop() -> asyncio.AbstractEventLoop | None:
+    """The event loop to which a channel belongs that is opened now; None: no loop is running."""
+    try:
+        return asyncio.get_running_loop()
+    except RuntimeError:
+        return None
+
+
 async def close_channel(channel: Channel) -> None:
     """Closes a channel and every call on it."""
     closing = channel.close()

@@ -16,10 +16,18 @@ class Channel:
     """A channel that opens at the first call. gRPC, which would otherwise take most of the time of
     `import hulld`, is imported at that time."""
 
-    def __init__(self, connection: Connection, opener: Callable[[Connection, Any], Any]) -> None:
-        """opener: creates gRPC's channel for the connection and its PEM files."""
+    def __init__(
+        self,
+        connection: Connection,
+        opener: Callable[[Connection, Any], Any],
+        running_loop: Callable[[], Any],
+    ) -> None:
+        """opener: creates gRPC's channel for the connection and its PEM files. running_loop: the
+        event loop to which such a channel belongs; None: any."""
         self._connection = connection
         self._opener = opener
+        self._running_loop = running_loop
+        self._loop: Any = None
         self._pem_files = connection.pem_files()
         self._lock = threading.Lock()
         self._channel: Any = None
@@ -44,7 +52,13 @@ class Channel:
                 # forked processes cannot make calls anyway.
                 os.environ.setdefault("GRPC_ENABLE_FORK_SUPPORT", "0")
                 self._channel = self._opener(self._connection, self._pem_files)
+                self._loop = self._running_loop()
                 _open_channels.add(self)
+            elif self._loop not in (None, self._running_loop()):
+                raise FailedPreconditionError(
+                    "the client belongs to the event loop of its first call; create one in each "
+                    "asyncio.run"
+                )
             return self._channel
 
     def call(self, kind: str, method: str) -> Any:

@@ -39,6 +39,10 @@ def open_channel(connection: Connection, pem_files: Any) -> Any:
     return grpc.secure_channel(connection.target, credentials, options)
 
 
+def running_loop() -> None:
+    """None: a channel belongs to no event loop."""
+
+
 def close_channel(channel: Channel) -> None:
     """Closes a channel and every call on it."""
     channel.close()
