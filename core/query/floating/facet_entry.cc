@@ -9,6 +9,7 @@
 #include "core/numeric/error_bounds.h"
 #include "core/numeric/exponent_limits.h"
 #include "core/numeric/simd_path.h"
+#include "core/query/placed/lanes.h"
 #include "core/query/terms/separation_bounds.h"
 
 namespace hulld {
@@ -16,12 +17,9 @@ namespace {
 
 using Facet = std::array<VertexPair, 3>;
 
-// Four doubles in the registers of the compilation target; a vector uses three.
-using Lanes = double __attribute__((vector_size(32)));
-
-// A vector in double-double arithmetic: DoubleDouble's operations on each component, with the same
-// error bounds. Everything is inlined, so that it is compiled for the instruction set of
-// FindCrossing.
+// A vector in double-double arithmetic, in three lanes: DoubleDouble's operations on each
+// component, with the same error bounds. Everything is inlined, so that it is compiled for the
+// instruction set of FindCrossing.
 struct LongVector {
   Lanes high;
   Lanes low;

@@ -4,20 +4,11 @@
 #include <cstdint>
 #include <cstring>
 
+#include "core/query/placed/lanes.h"
 #include "core/query/placed/plain_vector.h"
 
 namespace hulld {
 
-// Four doubles, and four integers of the same width, in the registers of the compilation target.
-using Lanes = double __attribute__((vector_size(32)));
-using LaneIds = int64_t __attribute__((vector_size(32)));
-
-[[gnu::always_inline]] inline void Load(const double* from, Lanes& lanes) {
-  std::memcpy(&lanes, from, sizeof lanes);
-}
-[[gnu::always_inline]] inline void Broadcast(double value, Lanes& lanes) {
-  lanes = Lanes{value, value, value, value};
-}
 // Sets every lane to the union of the bits of all lanes.
 [[gnu::always_inline]] inline void Unite(Lanes& lanes) {
   const Lanes halves = __builtin_shufflevector(lanes, lanes, 2, 3, 0, 1);

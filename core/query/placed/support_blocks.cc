@@ -6,23 +6,13 @@
 
 #include "core/base/check.h"
 #include "core/numeric/simd_path.h"
+#include "core/query/placed/lanes.h"
 
 namespace hulld {
 namespace {
 
-// Four doubles, and four integers of the same width, in the registers of the compilation target.
-using Lanes = double __attribute__((vector_size(32)));
-using LaneIds = int64_t __attribute__((vector_size(32)));
 // Above every index.
 constexpr int64_t kNone = std::numeric_limits<int64_t>::max();
-
-[[gnu::always_inline]] inline void Load(const double* from, Lanes& lanes) {
-  std::memcpy(&lanes, from, sizeof lanes);
-}
-
-[[gnu::always_inline]] inline void Broadcast(double value, Lanes& lanes) {
-  lanes = Lanes{value, value, value, value};
-}
 
 // Computes the values along (x, y, z) of four points.
 [[gnu::always_inline]] inline void Evaluate(const SupportBlock& block, const Lanes& x,

@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <cstring>
 #include <utility>
 
 #include "core/base/check.h"
 #include "core/base/stop_poll.h"
 #include "core/numeric/error_bounds.h"
 #include "core/numeric/simd_path.h"
+#include "core/query/placed/lanes.h"
 
 namespace hulld {
 namespace {
@@ -44,14 +44,6 @@ constexpr size_t kPointsPerCandidate = 16;
 constexpr double kLargestCoordinate = 0x1p900;
 constexpr double kMinExtent = 0x1p-800;
 
-using Lanes = double __attribute__((vector_size(32)));
-
-[[gnu::always_inline]] inline void Load(const double* from, Lanes& lanes) {
-  std::memcpy(&lanes, from, sizeof lanes);
-}
-[[gnu::always_inline]] inline void Broadcast(double value, Lanes& lanes) {
-  lanes = Lanes{value, value, value, value};
-}
 [[gnu::always_inline]] inline void Absolute(Lanes& lanes) {
   lanes = lanes > -lanes ? lanes : -lanes;
 }
