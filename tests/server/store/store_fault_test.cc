@@ -447,6 +447,7 @@ TEST_F(StoreFault, NoAckPrecedesItsSync) {
   Acks acks;
   std::atomic<bool> ending = false;
   std::vector<std::thread> writers;
+  writers.reserve(kWriters);
   for (int w = 0; w < kWriters; ++w) {
     writers.emplace_back([&, w] {
       const std::string id = absl::StrCat("h", w);
