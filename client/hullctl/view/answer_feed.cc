@@ -402,8 +402,9 @@ bool AnswerFeed::AnswerPair(const Query& query) {
 
 bool AnswerFeed::SendError(const Query& query, const absl::Status& status,
                            const std::string& message) {
-  is_unreachable_ |= absl::IsUnavailable(status);
-  return query.is_repeated || page_->SendText(message);
+  const bool is_unreachable = absl::IsUnavailable(status);
+  is_unreachable_ |= is_unreachable;
+  return (is_unreachable && query.is_repeated) || page_->SendText(message);
 }
 
 absl::StatusOr<std::string> AnswerFeed::RestingAnswer(const Query& query) const {

@@ -59,15 +59,15 @@ class AnswerFeed {
     bool certificate = false;
     uint64_t update = 0;
     bool rest = true;
-    // True if the page has the error of an earlier attempt.
+    // True if the last attempt found the server unreachable, and the page has that error.
     bool is_repeated = false;
     // True if a hull or the scene changed since the last answer about the motion.
     bool motion_is_stale = true;
   };
 
   void Run(const std::stop_token& stop);
-  // Sends the message of an error, or only notes that the server is unreachable if the page has it.
-  // Returns false if the page has closed.
+  // Sends the message of an error, unless a repeated query finds the server still unreachable: the
+  // page has that message. Returns false if the page has closed.
   bool SendError(const Query& query, const absl::Status& status, const std::string& message);
   // Sends the answer about the pair. Returns false if the page has closed.
   bool AnswerPair(const Query& query);

@@ -3,11 +3,70 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <condition_variable>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "client/hullctl/view/bridge/bridge.h"
+#include "tests/client/fake_hulld.h"
+
 namespace hulld {
 namespace answer_feed_test {
 
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::Not;
+
+// Records the answers about the pair.
+class RecordingPage : public PageChannel {
+ public:
+  bool SendText(std::string json) override {
+    const std::lock_guard lock(mutex_);
+    if (json.find(R"("type":"answer")") != std::string::npos) answers_.push_back(std::move(json));
+    changed_.notify_all();
+    return true;
+  }
+  bool SendBinary(std::string) override { return true; }
+
+  // Waits for this many answers and returns all.
+  std::vector<std::string> Wait(size_t count) {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [&] { return answers_.size() >= count; });
+    return answers_;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::vector<std::string> answers_;
+};
+
+// The page has the error until another one, or an answer, replaces it.
+TEST(AnswerFeed, AnUnreachableServerIsReportedOnceAndAskedAgain) {
+  FakeHulld hulld;
+  const grpc::Status unreachable(grpc::StatusCode::UNAVAILABLE, "unreachable");
+  hulld.FailNext("CheckCollision", {unreachable, unreachable,
+                                    grpc::Status(grpc::StatusCode::PERMISSION_DENIED, "revoked")});
+  ClientOptions options;
+  options.server = hulld.address();
+  options.retry.max_attempts = 1;
+  const Client client(options);
+  const auto page = std::make_shared<RecordingPage>();
+  AnswerFeed feed(client, page);
+  ViewScene scene;
+  scene.objects = {{"a", "a"}, {"b", "b"}};
+  feed.Show(scene, 1);
+  ViewQuery query;
+  query.scene = 1;
+  query.pair = {0, 1};
+  query.rest = true;
+  feed.Request(query);
+  EXPECT_THAT(page->Wait(2), ElementsAre(HasSubstr("unreachable"), HasSubstr("revoked")));
+  EXPECT_EQ(hulld.calls("CheckCollision"), 3);
+}
 
 TEST(AnswerFeed, AMotionIsQueriedFromStartToEndAtAnyTime) {
   ViewObject wall{"wall", "cube", -1, {1, 0, 0, 0, 9, 0, 0}, 0.5};
