@@ -101,8 +101,8 @@ int Run(const Config& config) {
   SetUpLog(config.log_level, config.log_format);
   SetUpHeap();
   RaiseDescriptorLimit();
-  // With fewer, gRPC aborts the process instead of reporting an error. **Observed**: 16 are too
-  // few, 20 suffice to start.
+  // If descriptors run out during the start, gRPC aborts the process. **Observed**: 16 are too few,
+  // and 20 suffice; the others are for connections and the files of the store.
   constexpr uint64_t kFewestDescriptors = 64;
   if (MaxDescriptors() < kFewestDescriptors) {
     spdlog::error(

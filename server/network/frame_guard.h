@@ -14,7 +14,7 @@ namespace hulld::server {
 
 // Limits on the HTTP/2 frames of a client. No gRPC client comes near them.
 struct FrameLimits {
-  // A number that is available immediately, and its growth.
+  // A token bucket: its capacity, and the tokens added per second.
   struct Rate {
     double burst;
     double per_second;
@@ -155,7 +155,8 @@ class FrameGuard {
     uint32_t stream() const;
     // Removes the rest of the payload, as far as it is there, from `bytes`, and returns it.
     std::string_view TakePayload(std::string_view& bytes);
-    // The same for the next header. Returns true if it is complete. Requires: no payload is left.
+    // Removes the bytes of the next header from `bytes`. Returns true once the header is complete.
+    // Requires: the payload before it has been removed.
     bool TakeHeader(std::string_view& bytes);
   };
 

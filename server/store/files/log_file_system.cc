@@ -50,14 +50,14 @@ class LogFileSystem::File : public rocksdb::FSWritableFileOwnerWrapper {
   }
 
  protected:
-  // Called with the results of operations, which they return.
+  // Record an operation and return its result.
   virtual IOStatus NoteAppended(const rocksdb::Slice& /*data*/, const IOStatus& status) {
     return status;
   }
   virtual IOStatus NoteSynced(const IOStatus& status) { return system_.NoteSync(status); }
 
   LogFileSystem& system_;
-  // Refuses appends if true.
+  // True after Log::CutTo: appends are refused.
   std::atomic<bool> is_cut_ = false;
 
  private:

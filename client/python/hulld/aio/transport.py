@@ -33,7 +33,7 @@ def open_channel(connection: Connection, pem_files: Any) -> Any:
 
 
 def running_loop() -> asyncio.AbstractEventLoop | None:
-    """The event loop to which a channel belongs that is opened now; None: no loop is running."""
+    """The running event loop, to which a new channel belongs; None: no loop is running."""
     try:
         return asyncio.get_running_loop()
     except RuntimeError:

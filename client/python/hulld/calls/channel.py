@@ -22,8 +22,8 @@ class Channel:
         opener: Callable[[Connection, Any], Any],
         running_loop: Callable[[], Any],
     ) -> None:
-        """opener: creates gRPC's channel for the connection and its PEM files. running_loop: the
-        event loop to which such a channel belongs; None: any."""
+        """opener: creates gRPC's channel for the connection and its PEM files. running_loop:
+        returns the event loop to which a new channel belongs; None: any."""
         self._connection = connection
         self._opener = opener
         self._running_loop = running_loop
@@ -41,8 +41,8 @@ class Channel:
         )
 
     def get(self) -> Any:
-        """gRPC's channel. FailedPreconditionError: the channel is closed; or as in
-        check_process."""
+        """gRPC's channel. FailedPreconditionError: the channel is closed or belongs to another
+        event loop; or as in check_process."""
         check_process()
         with self._lock:
             if self._closed:

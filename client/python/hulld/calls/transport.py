@@ -40,7 +40,7 @@ def open_channel(connection: Connection, pem_files: Any) -> Any:
 
 
 def running_loop() -> None:
-    """None: a channel belongs to no event loop."""
+    """Returns None: a channel belongs to no event loop."""
 
 
 def close_channel(channel: Channel) -> None:

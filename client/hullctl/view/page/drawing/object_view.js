@@ -7,7 +7,7 @@ import {MARK_COLORS, RELATIONS} from 'hulld/palette.js';
 
 const FLASH_MS = 1200;
 
-// Objects share shapes and their GPU resources, in a unit of length.
+// Objects share shapes and their GPU resources, which are in the unit of drawn coordinates.
 const geometries = new WeakMap();
 export function geometryOf(shape, kind, unit) {
   let kinds = geometries.get(shape);

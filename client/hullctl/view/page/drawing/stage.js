@@ -1,5 +1,5 @@
-// The picture: renderer, camera, lights, and orbiting. Draws only after changes. Coordinates are
-// drawn ones (model.js).
+// The picture: renderer, camera, lights, and orbiting. Draws only after changes. Uses
+// drawn coordinates (model.js).
 import {THREE} from 'hulld/drawing/three.js';
 import {AXIS_COLORS, THEMES} from 'hulld/palette.js';
 import {unitQuaternion} from 'hulld/pose.js';
